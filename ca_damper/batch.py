@@ -11,7 +11,7 @@ import numpy as np
 from ca_damper.engine.damper_engine import borrow
 from ca_damper.engine.launches import Launches
 from ca_damper.engine.loaded_scenes import LoadedScenes
-from ca_damper.engine.modal_mount import ModalMount, checked_mount
+from ca_damper.engine.mount import ModalMount, mount_of
 from ca_damper.engine.recorder import ROOM
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.filling import Filling, Fillings
@@ -36,7 +36,7 @@ from ca_damper.scenes.checks import (
     starts_of,
 )
 from ca_damper.scenes.scene_numbers import SceneNumbers
-from ca_damper.scenes.table import SceneTable, dealt
+from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit import backend, runtime
 from taichi_dem.kit.checkpoint import identity_of, version_text
 from taichi_dem.kit.display import in_brief
@@ -133,12 +133,16 @@ class Batch(LoadedScenes):
         self.fillings, self.estimates = found
         runtime.session()
         self.if_diverged = choice("if_diverged", if_diverged, ("nan", "raise"))
-        self.mount, self.modal = checked_mount(mount, structure)
+        self.support = mount_of(mount, structure)
+        self.mount = self.support.kind.word
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
         tolerances = positive("rtol", rtol, zero_allowed=True), positive("atol", atol)
-        has_box = None if self.modal is None else self.modal.has_box(self.count)
         self.excitation = checked_excitation(excitation, mount)
-        self.numbers = self._checked(SceneNumbers(self.fillings, table, has_box))
+        has_box = self.support.has_box(self.count)
+        self.numbers = SceneNumbers(self.fillings, table, has_box)
+        self.support.check(self.table)
+        natural = self.support.frequencies(self.table)
+        self.too_few = sampling_found(self.excitation, natural)
         self.recorded_samples = whole("recorded_samples", recorded_samples, 0, MOST_CYCLES)
         self.time_origin = np.zeros(self.count)
         self.periods: Periods | None = None
@@ -150,32 +154,16 @@ class Batch(LoadedScenes):
 
     def _take_engine(self, rtol: float, atol: float) -> None:
         counts = self.count, self.measured_cycles, self.recorded_samples
-        kind = self.mount if self.modal is None else self.modal.structure.mode_count
-        asked = self.fillings, kind, self.excitation.kind, counts, self.excitation.sizes
-        self._engine = borrow(*asked, owner=self)
+        kinds = self.support.kind, self.excitation.kind
+        self._engine = borrow(self.fillings, *kinds, counts, self.excitation.sizes, owner=self)
         self._tell_compiling("set-up", 1)
         engine = self.engine
         engine.clear()
-        engine.load(self.fillings, self.table, rtol, atol, self.excitation)
-        if self.modal is not None:
-            engine.container.hang(self.modal)
+        engine.load(self.fillings, self.table, self.support, rtol, atol, self.excitation)
         self._load_pace()
         if backend.most_rounds():
             rounds = _ROUNDS_A_PLACE * max(engine.capacity[3:], default=1)
             self.launches.most_steps = max(1, backend.most_rounds() // rounds)
-
-    def _checked(self, numbers: SceneNumbers) -> SceneNumbers:
-        """The numbers; InputError where structure, excitation and they do not fit each other."""
-        too_few: tuple[str, ...] = ()
-        if self.modal is not None:
-            self.modal.check(numbers.table)
-            too_few = sampling_found(self.excitation, self.modal.structure.frequencies)
-        elif self.mount == "spring":
-            stiffness, mass = map(numbers.table.column, ("stiffness", "mass"))
-            natural = np.sqrt(stiffness / mass) / (2.0 * np.pi)
-            too_few = sampling_found(self.excitation, natural)
-        self.too_few = too_few
-        return numbers
 
     def __repr__(self) -> str:
         label, count = self.fillings.kinds[0].label, f"{self.count:,} scenes"
@@ -509,8 +497,8 @@ class Batch(LoadedScenes):
         if (begin + steps).max() > _MOST_STEPS:
             raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
         check_within(self.excitation, (begin + steps) * self.table.column("dt"))
-        deal = dealt if self.modal is None else self.modal.order
-        order = deal((1 + self.table.column("particles")) * steps, runtime.settings().threads)
+        cost = (1 + self.table.column("particles")) * steps
+        order = self.support.order(cost, runtime.settings().threads)
         plan = np.stack([begin, begin + steps, begin + before_measuring, order])
         self.engine.coupling.aim(plan)
         self.launches.begin()

@@ -81,14 +81,14 @@ def write_decays(path: str, decays: Mapping[str, Decay]) -> None:
 def draw_films(path: str, page: str | None, films: tuple[Film, Film], options: Namespace) -> None:
     """Write the animation, and the page that plays it, None for none."""
     # Imported here, so that matplotlib loads only where a picture is drawn.
-    from ca_damper.plot.boxes import Box, Hanging, film_hanging
+    from ca_damper.plot.boxes import BoxSize, Hanging, film_hanging
     from ca_damper.plot.containers import show_containers
     from taichi_dem.kit.plot_style import GREY, styles_of
 
     filling = films[1].filling
-    box, style = Box.of(filling), styles_of([filling.label])[filling.label]
+    box, style = BoxSize.of(filling), styles_of([filling.label])[filling.label]
     # The rigid mass moves as smoothly as the structure: its box is not staggered.
-    plain = Box(box.width, box.height, box.diameter)
+    plain = BoxSize(box.width, box.height, box.diameter)
     (fixed,), (free,) = (film.frames for film in films)
     block = [_stacked(frame, plain) for frame in fixed]
     curves = [(film.history["time_s"][:, 0], film.history["x"][:, 0]) for film in films]

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import taichi as ti
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
@@ -193,41 +192,3 @@ class Oscillator:
         x = self.base_amplitude * self.transfer(frequency, added_mass)
         sag = real_numbers("gravity", gravity) * np.asarray(added_mass) / self.stiffness
         return x.imag - sag, 2.0 * np.pi * np.asarray(frequency) * x.real
-
-
-@ti.dataclass
-class Forcing:
-    """Acceleration terms of the container in a step, per mass; time counts from its beginning."""
-
-    stiffness: ti.f64
-    damping: ti.f64
-    omega: ti.f64
-    drive: ti.f64
-    quadrature: ti.f64
-    constant: ti.f64
-
-
-@ti.pyfunc
-def sine_and_cosine(angle):
-    """Of an angle up to a sixth, by their series to round-off (angle^11 / 11! < 1e-16)."""
-    # Faster than the library's, which must serve every angle.
-    q = angle * angle
-    sine = angle * (1 - q / 6 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72))))
-    cosine = 1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56 * (1 - q / 90))))
-    return sine, cosine
-
-
-@ti.func
-def slope(forcing, t, y):
-    """d(x, v)/dt of the container for y = (x, v): the right-hand side that RK45 integrates."""
-    sine, cosine = sine_and_cosine(forcing.omega * t)
-    return slope_at_phase(forcing, ti.Vector([sine, cosine]), y)
-
-
-@ti.func
-def slope_at_phase(forcing, phase, y):
-    """The same for sine and cosine of omega t, which are the same in every step."""
-    sine, cosine = phase[0], phase[1]
-    pushed = forcing.drive * cosine + forcing.quadrature * sine + forcing.constant
-    held = forcing.stiffness * y[0] + forcing.damping * y[1]
-    return ti.Vector([y[1], pushed - held])

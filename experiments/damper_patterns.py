@@ -19,7 +19,7 @@ import numpy as np
 
 from ca_damper import Automaton, Batch, Paper, SceneTable, Spheres, film
 from ca_damper.automaton import ACCOUNTINGS
-from ca_damper.plot.boxes import Box, animate_films, picture_film_strips
+from ca_damper.plot.boxes import BoxSize, animate_films, picture_film_strips
 from ca_damper.plot.curves import FilmMeasures, picture_cycle
 from ca_damper.report.progress import Stages
 from taichi_dem.kit import study
@@ -77,7 +77,7 @@ def run(options):
     phase = np.arange(FRAMES) * (steps // FRAMES) / steps
     for name, batch in batches.items():
         with ProgressBar(TITLES[name]) as progress:
-            films, box = shake(batch, options, progress), Box.of(batch.filling)
+            films, box = shake(batch, options, progress), BoxSize.of(batch.filling)
         runs += [run_of(name, n, batch.filling.label, box, films[n], phase) for n in PARTICLES]
     runs.sort(key=lambda one: one.particles)
     picture_all(folder, runs, motion)

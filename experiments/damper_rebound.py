@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 from ca_damper import Automaton, Batch, Paper, SceneTable, Spheres, film
-from ca_damper.automaton.transport import READINGS
+from ca_damper.automaton.paper.transport import READINGS
 from ca_damper.theory.bouncing import Fall, RecordedFall
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, VIOLET, picture, styles_of

@@ -29,7 +29,7 @@ def unit_vectors() -> np.ndarray:
     return np.column_stack([np.sin(_ANGLE), alignments()[:, UP]])
 
 
-class Geometry:
+class LatticeGeometry:
     """Which cell lies where, in NumPy; columns and rows are counted inside the walls."""
 
     def __init__(self, columns: int, rows: int):
@@ -87,9 +87,9 @@ class Geometry:
         return width * np.column_stack([column + 0.5, row + 0.5 + 0.5 * ((column + 1) % 2)])
 
 
-def geometry_of(options: Any) -> Geometry:
+def geometry_of(options: Any) -> LatticeGeometry:
     """Geometry of the options of an automaton."""
-    return Geometry(options.columns, options.rows)
+    return LatticeGeometry(options.columns, options.rows)
 
 
 @ti.dataclass
@@ -129,9 +129,9 @@ class Lattice:
         if self.looks_ahead:
             fillings.write(self.neighbour, lambda one: geometry_of(one).neighbours())
 
-    def geometry(self, s: int) -> Geometry:
+    def geometry(self, s: int) -> LatticeGeometry:
         """The geometry of a scene."""
-        return Geometry(int(self.size.columns[s]), int(self.size.rows[s]))
+        return LatticeGeometry(int(self.size.columns[s]), int(self.size.rows[s]))
 
     @ti.func
     def blank(self, s, cell):

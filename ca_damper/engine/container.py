@@ -1,314 +1,356 @@
-"""Motion of the container: on its spring, driven by base and filling, or fixed to the base.
+"""Motion of the containers on one structure: a group of scenes that begins with ``first(s)``.
 
-A container moves one scene, or a group of ``scenes()`` that begins with scene ``first(s)``. All
-have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)`` of every scene, then
-``complete_start(first)``; ``motion(s)`` at the beginning of a step, with ``base(s)``, the base's
-displacement [m]; ``recoil(s)``, the speed that a unit impulse gives it [1/kg]; ``renew(s)`` where
-the base has changed its motion, between two frequencies of a sweep; ``set_action(s, action)`` of
-every filling over the step, and then ``advance(first)``, which returns the attempts of the
-integration, or -1.
+A structure of n modes carries the boxes of a group; an oscillator has one mode, in which the whole
+container moves, and the base has none. The ti.funcs of a container, in the order in which a run
+calls them: ``start(s, x, v)`` of every scene, then ``complete_start(first)``; in a step
+``motion(s)`` at its beginning, ``set_action(s, action)`` of every filling, and ``advance(first)``,
+which returns the attempts of the integration, or -1. ``renew(s)`` follows a change of the base's
+motion, between two frequencies of a sweep.
 """
 
-from typing import Any
-
+import numpy as np
 import taichi as ti
 
 from ca_damper.engine import rk45
+from ca_damper.engine.mount import Mount, MountKind
 from ca_damper.engine.signals import DeviceExcitation
-from ca_damper.filling import Motion
-from ca_damper.oscillator import Forcing, sine_and_cosine, slope, slope_at_phase
-from ca_damper.scenes.clock import Clock
+from ca_damper.filling import Action, Motion, Recoil
+from ca_damper.scenes.clock import CycleClock
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 
 #: Attempts within one step of the filling after which the container counts as lost.
 MOST_ATTEMPTS = 1000
-#: Times of the stages of RK45 at which the forcing is needed, as shares of the step.
-_STAGES = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0)
 
 
 @ti.data_oriented
 class Container:
-    """Base of all containers: what acts on the container of each scene in the present step.
+    """Modes of all groups, and their places, in metres as a ``Mount`` counts them.
 
-    impulse [N s] and carried [kg]. tolerance: local error allowed, rtol and atol, the latter in m
-    and m/s. is_group: whether it may move several scenes.
+    state, slope: coordinates and speeds of the modes, and their change. struck: share of the
+    present accelerations that is due to impacts [m/s^2]. impulse [N s] and carried [kg]: action of
+    the filling of each scene in the present step. tolerance: local error allowed, rtol and atol,
+    the latter in m and m/s.
     """
 
-    is_group = False
-
-    def __init__(self, table: SceneFields):
-        self.table = table
-        self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
+    def __init__(
+        self, table: SceneFields, clock: CycleClock, excitation: DeviceExcitation, kind: MountKind
+    ):
+        self.table, self.clock, self.excitation = table, clock, excitation
+        n, vector = kind.modes, ti.types.vector(kind.modes, ti.f64)
+        self.modes, self.is_group = n, kind.word == "structure"
+        self.moves, self.lifts = kind.word != "base", kind.word == "floor"
+        for name in ("mass", "stiffness", "damping", "share", "pushed", "shape", "lift"):
+            setattr(self, name, table.vector(n, ti.f64))
+        self.residual, self.home = table.field(ti.f64), table.field(ti.i32)
+        self.group, self.boxed = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
         self.tolerance = ti.field(ti.f64, shape=2)
+        self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
+        self.state, self.slope = table.vector(2 * n, ti.f64), table.vector(2 * n, ti.f64)
+        self.struck = table.vector(n, ti.f64)
+        self.elapsed, self.changed = table.field(ti.i32), table.field(ti.i32)
+        if self.is_group:
+            self.inverse = table.field(ti.f64, n, n)
+            self.hit, self.rubbed = table.field(ti.f64), table.field(ti.f64)
+            self.speed_gain, self.shared = table.field(ti.f64), table.field(ti.f64)
+        per_mode = ("stiffness", "damping", "share", "pushed", "lag", "constant")
+        self.Load = ti.types.struct(scene=ti.i32, start=ti.f64, **dict.fromkeys(per_mode, vector))
 
-    def load(self, rtol: float, atol: float) -> None:
-        """Take over the numbers of a batch."""
+    def load(self, mount: Mount, numbers: dict[str, np.ndarray], rtol: float, atol: float) -> None:
+        """Take over the numbers of a batch: of its mount by name, and its tolerances."""
         assign(self.tolerance, [rtol, atol])
+        assign(self.group, mount.group)
+        assign(self.boxed, mount.boxes)
+        for name, rows in numbers.items():
+            assign(getattr(self, name), rows)
 
     @ti.func
     def first(self, s):
         """First scene of the group of scene s."""
-        return s
+        result = s
+        if ti.static(self.is_group):
+            result = s - s % self.group[None]
+        return result
 
     @ti.func
     def scenes(self):
         """Scenes of a group."""
-        return 1
+        count = 1
+        if ti.static(self.is_group):
+            count = self.group[None]
+        return count
+
+    @ti.func
+    def boxes(self):
+        """Scenes of a group that have a box: its first."""
+        count = 1
+        if ti.static(self.is_group):
+            count = self.boxed[None]
+        return count
+
+    @ti.func
+    def start(self, s, x, v):
+        """Add the motion of a place to the modes; in order, and then ``complete_start``."""
+        first = self.first(s)
+        n = ti.static(self.modes)
+        if s == first:
+            self.state[first], self.elapsed[first] = ti.Vector.zero(ti.f64, 2 * n), 0
+        y, lift = self.state[first], self.lift[s]
+        for k in ti.static(range(n)):
+            y[k], y[n + k] = y[k] + lift[k] * x, y[n + k] + lift[k] * v
+        self.state[first] = y
+        self.impulse[s], self.carried[s] = 0.0, 0.0
 
     @ti.func
     def complete_start(self, first):
-        """Nothing to do."""
+        """Nothing acts on a group but springs, dashpots and excitation."""
+        self.struck[first] = ti.Vector.zero(ti.f64, self.modes)
+        self.renew(first)
 
     @ti.func
     def renew(self, s):
-        """Nothing to do."""
+        """Take over another motion of the base."""
+        first = self.first(s)
+        if ti.static(self.moves):
+            if s == first:
+                self.changed[first] = 1
+                self.begin(first)
+                self._load_of_step(first)
+
+    @ti.func
+    def begin(self, first):
+        """Prepare for a motion of the base: nothing to do."""
+
+    @ti.func
+    def recoil(self, s):
+        """Speed that a unit impulse gives [1/kg], of all modes together, with nothing carried."""
+        # Springs and dashpots take no part in an impulse.
+        shape = self.shape[s]
+        return (shape * shape / self.mass[s]).sum()
+
+    @ti.func
+    def base(self, s):
+        """Displacement of the base at the beginning of the step [m]."""
+        return self._base(self.first(s))[0]
+
+    @ti.func
+    def _base(self, first):
+        return self.excitation.base.now(first, self.elapsed[first] * self.table.dt[first])
+
+    @ti.func
+    def motion(self, s):
+        """Displacement, velocity, and acceleration without the impacts of the step before."""
+        first = self.first(s)
+        n = ti.static(self.modes)
+        y, pulled = self.state[first], self.slope[first][n:] - self.struck[first]
+        seen = ti.Vector([y[0], y[n], pulled[0]])
+        if ti.static(not self.moves):
+            seen = self._base(first)
+        elif ti.static(self.is_group):
+            seen, shape = self.residual[s] * self._base(first), self.shape[s]
+            for k in ti.static(range(n)):
+                seen += shape[k] * ti.Vector([y[k], y[n + k], pulled[k]])
+        return Motion(seen[0], seen[1], seen[2])
 
     @ti.func
     def set_action(self, s, action):
         """Take over the action of the filling of a scene over the step."""
         if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
             self.impulse[s], self.carried[s] = action.impulse, action.carried
-            self._note_action(s)
+            self.changed[self.first(s)] = 1
 
     @ti.func
-    def _note_action(self, s):
-        """Nothing that depends on it is kept."""
-
-
-@ti.data_oriented
-class SpringContainer(Container):
-    """Base of containers with one spring and dashpot each, that RK45 moves on.
-
-    They have ``_begin(s)``, ``_load(s)`` over a step, ``_slope(s, load)`` at its beginning and
-    ``_integrated(s, load)``: state and slope at its end, and attempts.
-
-    state, slope: displacement and speed, and their change. impulse_velocity: share of the present
-    acceleration that is due to impacts [m/s^2].
-    """
-
-    def __init__(self, table: SceneFields):
-        super().__init__(table)
-        self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
-        self.impulse_velocity = table.field(ti.f64)
-
-    @ti.func
-    def start(self, s, x, v):
-        """Place the container; nothing acts on it but spring, dashpot and excitation."""
-        self.state[s], self.impulse_velocity[s] = ti.Vector([x, v]), 0.0
-        self.impulse[s], self.carried[s] = 0.0, 0.0
-        self._begin(s)
-        self._note_action(s)
-
-    @ti.func
-    def recoil(self, s):
-        """Of the mass alone: spring and dashpot take no part in an impulse."""
-        return 1.0 / self.table.mass[s]
-
-    @ti.func
-    def motion(self, s):
-        """Displacement, velocity, and acceleration without the impacts of the step before."""
-        return Motion(
-            self.state[s][0], self.state[s][1], self.slope[s][1] - self.impulse_velocity[s]
-        )
-
-    @ti.func
-    def _note_action(self, s):
-        """The slope at the beginning of the step; the last one serves again where none is new."""
-        self.slope[s] = self._slope(s, self._load(s))
-
-    @ti.func
-    def advance(self, s):
-        """Take the container over the step."""
-        y, change, attempts = self._integrated(s, self._load(s))
-        self.state[s], self.slope[s] = y, change
-        mass = self.table.mass[s] + self.carried[s]
-        self.impulse_velocity[s] = self.impulse[s] / (self.table.dt[s] * mass)
+    def advance(self, first):
+        """Take a group over the step."""
+        attempts = 1
+        if ti.static(self.moves):
+            load = self._load_of_step(first)
+            y, change, tried = self.integrated(first, load)
+            self.state[first], self.slope[first] = y, change
+            self.struck[first] = self._struck(first)
+            attempts = tried
+        self.elapsed[first] = self.elapsed[first] + 1
         return attempts
 
-
-@ti.data_oriented
-class SprungContainer(SpringContainer):
-    """The container on its spring, its base moving by a single sine."""
-
-    def __init__(self, table: SceneFields, clock: Clock):
-        super().__init__(table)
-        self.clock, self.phase = clock, table.vector(2, ti.f64, len(_STAGES))
+    @ti.func
+    def _load_of_step(self, first):
+        """Load over the step that begins now, and the slope there, which serves again as it was."""
+        changed = self.changed[first] != 0
+        if ti.static(self.is_group):
+            if changed:
+                self._invert(first)
+        load = self.acting(first)
+        if changed:
+            self.slope[first] = self.slope_of(load, self.state[first])
+            self.changed[first] = 0
+        return load
 
     @ti.func
-    def base(self, s):
-        """Displacement of the base [m]."""
-        return self.table.base_amplitude[s] * self.clock.circle[s][0]
+    def _mass(self, s):
+        """Mass of a container of its own and of what it carries."""
+        return self.mass[s][0] + self.carried[s]
 
     @ti.func
-    def renew(self, s):
-        """Take over the turn of the base at another frequency."""
-        self._begin(s)
-        self._note_action(s)
+    def acting(self, first):
+        """What acts over the step, for ``change``."""
+        return self.load_of(first)
 
     @ti.func
-    def _begin(self, s):
-        omega = 2.0 * ti.math.pi * self.table.frequency[s]
-        for k in ti.static(range(len(_STAGES))):
-            sine, cosine = sine_and_cosine(omega * (self.table.dt[s] * _STAGES[k]))
-            self.phase[s, k] = ti.Vector([sine, cosine])
-
-    @ti.func
-    def _slope(self, s, forcing):
-        """At the beginning of a step, where the turn of the base is none."""
-        return slope_at_phase(forcing, ti.Vector([0.0, 1.0]), self.state[s])
-
-    @ti.func
-    def _load(self, s):
-        """Forcing over the step that begins now; (K + i w C) y0 turned by the present phase."""
-        table, circle, carried = self.table, self.clock.circle[s], self.carried[s]
-        per_mass = 1.0 / (table.mass[s] + carried)
-        omega = 2.0 * ti.math.pi * table.frequency[s]
-        stiffness, damping = table.stiffness[s] * per_mass, table.damping[s] * per_mass
-        by_spring = stiffness * table.base_amplitude[s]
-        by_dashpot = damping * omega * table.base_amplitude[s]
-        force = self.impulse[s] / table.dt[s] - carried * table.gravity[s]
-        return Forcing(
-            stiffness=stiffness,
-            damping=damping,
-            omega=omega,
-            drive=by_spring * circle[0] + by_dashpot * circle[1],
-            quadrature=by_spring * circle[1] - by_dashpot * circle[0],
-            constant=force * per_mass,
+    def load_of(self, first):
+        """Load over the step; that of a single mode is per mass of all it moves."""
+        per_mass, dt = 1.0, self.table.dt[first]
+        if ti.static(not self.is_group):
+            per_mass = 1.0 / self._mass(first)
+        constant, lag = ti.Vector.zero(ti.f64, self.modes), ti.Vector.zero(ti.f64, self.modes)
+        for k in range(self.boxes()):
+            s = first + k
+            heavy, shape = self.carried[s], self.shape[s]
+            lag += heavy * self.residual[s] * shape
+            if ti.static(self.lifts):
+                # On a spring the weight of the container itself is in x = 0.
+                heavy += self.mass[s][0]
+            constant += (self.impulse[s] / dt - heavy * self.table.gravity[s]) * shape
+        return self.Load(
+            scene=first,
+            start=self.elapsed[first] * dt,
+            stiffness=self.stiffness[first] * per_mass,
+            damping=self.damping[first] * per_mass,
+            share=self.share[first],
+            pushed=self.pushed[first] * per_mass,
+            lag=lag,
+            constant=constant * per_mass,
         )
 
     @ti.func
-    def _integrated(self, s, forcing):
-        """By the phases of the stages in a first attempt: the same bits, half the time."""
-        phase = [self.phase[s, k] for k in ti.static(range(len(_STAGES)))]
-        before, dt, attempts = self.state[s], self.table.dt[s], 1
-        y, change, gap = rk45.stages(
-            slope_at_phase,
-            *(forcing, phase[0], phase[1], phase[2], phase[3], phase[4], before, self.slope[s], dt),
-        )
-        error = rk45.scaled_norm(gap, before, y, self.tolerance[0], self.tolerance[1])
-        if not error <= 1.0:
-            bounds = self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS
-            y, change, attempts = rk45.integrate(
-                slope, forcing, 0.0, dt, before, self.slope[s], dt, *bounds
-            )
-        return y, change, attempts
-
-
-@ti.dataclass
-class Load:
-    """Numbers of scene s over a step from ``start`` [s], per mass of all it moves."""
-
-    scene: ti.i32
-    start: ti.f64
-    stiffness: ti.f64
-    damping: ti.f64
-    per_mass: ti.f64
-    constant: ti.f64
-
-
-@ti.data_oriented
-class ExcitedContainer(SpringContainer):
-    """The container on its spring, its base and a force moving as an Excitation says."""
-
-    def __init__(self, table: SceneFields, excitation: DeviceExcitation, lifts: bool):
-        super().__init__(table)
-        self.excitation, self.lifts, self.elapsed = excitation, lifts, table.field(ti.i32)
+    def slope_of(self, load, y):
+        """At the beginning of the step."""
+        return self.change(load, 0.0, y)
 
     @ti.func
-    def base(self, s):
-        """Displacement of the base at the beginning of the step [m]."""
-        return self.excitation.base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)[0]
-
-    @ti.func
-    def _begin(self, s):
-        self.elapsed[s] = 0
-
-    @ti.func
-    def _slope(self, s, load):
-        return self._change(load, 0.0, self.state[s])
-
-    @ti.func
-    def _load(self, s):
-        """Load over the step that begins now."""
-        heavy = self.carried[s]
-        per_mass = 1.0 / (self.table.mass[s] + heavy)
-        if ti.static(self.lifts):
-            # On a spring the weight of the container itself is in x = 0.
-            heavy += self.table.mass[s]
-        force = self.impulse[s] / self.table.dt[s] - heavy * self.table.gravity[s]
-        return Load(
-            scene=s,
-            start=self.elapsed[s] * self.table.dt[s],
-            stiffness=self.table.stiffness[s] * per_mass,
-            damping=self.table.damping[s] * per_mass,
-            per_mass=per_mass,
-            constant=force * per_mass,
-        )
-
-    @ti.func
-    def _change(self, load, t, y):
-        """d(x, v)/dt for y = (x, v): the right-hand side that RK45 integrates."""
+    def change(self, load, t, y):
+        """d(q, q')/dt of a group's modes for y = (q, q'): the right-hand side of RK45."""
+        n = ti.static(self.modes)
         base = self.excitation.base.at(load.scene, load.start, t)
-        pull = load.stiffness * (base[0] - y[0]) + load.damping * (base[1] - y[1])
+        push = self.excitation.force.at(load.scene, load.start, t)[0]
+        spring = load.stiffness * (load.share * base[0] - y[:n])
+        pull = spring + load.damping * (load.share * base[1] - y[n:])
         if ti.static(self.lifts):
             # Nothing at a distance, where a dashpot alone would already act.
-            pull = ti.select(y[0] < base[0], ti.max(0.0, pull), 0.0)
-        push = self.excitation.force.at(load.scene, load.start, t)[0] * load.per_mass
-        return ti.Vector([y[1], pull + push + load.constant])
+            pull[0] = ti.select(y[0] < base[0], ti.max(0.0, pull[0]), 0.0)
+        by_filling = load.constant
+        if ti.static(self.is_group):
+            by_filling -= base[2] * load.lag
+        return self._changed(load.scene, y, pull + load.pushed * push + by_filling)
 
     @ti.func
-    def _integrated(self, s, load):
-        dt, bounds = self.table.dt[s], (self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS)
-        y, change, attempts = rk45.integrate(
-            self._change, load, 0.0, dt, self.state[s], self.slope[s], dt, *bounds
+    def _changed(self, first, y, pull):
+        """Speeds, and accelerations by the pull on each mode."""
+        n = ti.static(self.modes)
+        change = y
+        if ti.static(self.is_group):
+            pull = self._gain(first, pull)
+        for k in ti.static(range(n)):
+            change[k], change[n + k] = y[n + k], pull[k]
+        return change
+
+    @ti.func
+    def integrated(self, first, load):
+        """State and slope at the end of the step, and attempts."""
+        dt, bounds = self.table.dt[first], (self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS)
+        return rk45.integrate(
+            self.change, load, 0.0, dt, self.state[first], self.slope[first], dt, *bounds
         )
-        self.elapsed[s] = self.elapsed[s] + 1
-        return y, change, attempts
-
-
-@ti.data_oriented
-class PrescribedContainer(Container):
-    """The container fixed to the base, whose motion is prescribed, whatever fills it."""
-
-    def __init__(self, table: SceneFields, excitation: DeviceExcitation):
-        super().__init__(table)
-        self.moved_by, self.elapsed = excitation.base, table.field(ti.i32)
 
     @ti.func
-    def start(self, s, x, v):
-        """Time zero; x and v are not used."""
-        self.elapsed[s], self.impulse[s], self.carried[s] = 0, 0.0, 0.0
+    def _struck(self, first):
+        """Accelerations of the modes by the impacts of the step."""
+        dt, struck = self.table.dt[first], ti.Vector.zero(ti.f64, self.modes)
+        if ti.static(self.is_group):
+            for s in range(first, first + self.boxes()):
+                struck += self.impulse[s] / dt * self.shape[s]
+            struck = self._gain(first, struck)
+        else:
+            struck = self.shape[first] * (self.impulse[first] / (dt * self._mass(first)))
+        return struck
 
     @ti.func
-    def recoil(self, s):
-        """None: no impulse changes the motion of the base."""
-        return 0.0
+    def _gain(self, first, pull):
+        """Accelerations of the modes of a group by forces on them."""
+        # In rolled loops: unrolled, eight modes take a minute to compile.
+        gain = pull
+        for i in range(self.modes):
+            total = 0.0
+            for j in range(self.modes):
+                total += self.inverse[first, i, j] * pull[j]
+            gain[i] = total
+        return gain
 
     @ti.func
-    def base(self, s):
-        """Displacement of the base at the beginning of the step [m]."""
-        return self.motion(s).x
+    def _invert(self, first):
+        """Inverse of m + sum carried shape shape^T."""
+        # With g = inverse shape, place by place: inverse - c g g^T / (1 + c shape.g) (Sherman and
+        # Morrison, Ann. Math. Stat. 21 (1950) 124).
+        mass = self.mass[first]
+        for i in range(self.modes):
+            for j in range(self.modes):
+                self.inverse[first, i, j] = 0.0
+            self.inverse[first, i, i] = 1.0 / mass[i]
+        for s in range(first, first + self.boxes()):
+            self._carry(first, s, self.carried)
 
     @ti.func
-    def motion(self, s):
-        """Of the base."""
-        now = self.moved_by.now(s, self.elapsed[s] * self.table.dt[s])
-        return Motion(now[0], now[1], now[2])
+    def _carry(self, first, s, masses: ti.template()):
+        """Add the masses of all boxes at a place to the modal masses, at the first of its boxes."""
+        c = 0.0
+        for other in range(s, first + self.boxes()):
+            if self.home[other] == s - first:
+                c += masses[other]
+        if c > 0.0:
+            shape, more = self.shape[s], 1.0
+            gain = self._gain(first, shape)
+            for k in ti.static(range(self.modes)):
+                more += c * shape[k] * gain[k]
+            for i in range(self.modes):
+                for j in range(self.modes):
+                    less = c / more * gain[i] * gain[j]
+                    self.inverse[first, i, j] = self.inverse[first, i, j] - less
 
     @ti.func
-    def advance(self, s):
-        """Nothing to integrate: time moves the base."""
-        self.elapsed[s] = self.elapsed[s] + 1
-        return 1
+    def set_blows(self, s, blows):
+        """Take over blows of the filling of a scene that wait for those of the other boxes."""
+        self.hit[s], self.rubbed[s] = blows.struck, blows.rubbed
+        self.set_action(s, Action(blows.impulse, blows.carried))
 
+    @ti.func
+    def resolve(self, first):
+        """Resolve the blows of all boxes of a group together."""
+        some, end = 0.0, first + self.boxes()
+        for s in range(first, end):
+            some += self.hit[s] + self.rubbed[s]
+            self.speed_gain[s], self.shared[s] = 0.0, 0.0
+        if some > 0.0:
+            self.changed[first] = 1
+            self._invert(first)
+            for s in range(first, end):
+                if self.rubbed[s] > 0.0:
+                    self._share(first, s)
+            for s in range(first, end):
+                self._carry(first, s, self.hit)
+            struck = self._struck(first)
+            for s in range(first, end):
+                self.speed_gain[s] = self.table.dt[first] * self.shape[s].dot(struck)
 
-def container_of(
-    mount: str, table: SceneFields, clock: Clock, excitation: DeviceExcitation, is_sine: bool
-) -> Any:
-    """Container on a mount under an excitation; is_sine: which is a single sine of the base."""
-    if mount == "base":
-        return PrescribedContainer(table, excitation)
-    if mount == "spring" and is_sine:
-        return SprungContainer(table, clock)
-    return ExcitedContainer(table, excitation, lifts=mount == "floor")
+    @ti.func
+    def _share(self, first, s):
+        """Add what is rubbed in a box to the shares of all boxes."""
+        gain = self._gain(first, self.shape[s])
+        for other in range(first, first + self.boxes()):
+            moved = self.rubbed[s] * ti.abs(self.shape[other].dot(gain))
+            self.shared[other] = self.shared[other] + moved
+
+    @ti.func
+    def recoil_of(self, s):
+        """How the box of a scene takes the blows of the step."""
+        motion = self.motion(s)
+        free = motion.v + motion.a * self.table.dt[s]
+        return Recoil(free + self.speed_gain[s], self.shared[s])

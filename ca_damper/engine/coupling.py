@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from ca_damper.engine.container import Container
 from ca_damper.filling import Action, Motion
 from ca_damper.report import measures
-from ca_damper.scenes.clock import Clock
+from ca_damper.scenes.clock import CycleClock
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import assign
@@ -69,8 +70,8 @@ class Coupling:
     def __init__(
         self,
         table: SceneFields,
-        clock: Clock,
-        container: Any,
+        clock: CycleClock,
+        container: Container,
         device: Any,
         account: MomentumAccount,
         recorder: Any,
@@ -84,7 +85,8 @@ class Coupling:
         self.sums, self.extremes = table.vector(SUM_COUNT, ti.f64), table.vector(2, ti.f64)
         self.record = table.field(ti.f64, "cycles", len(measures.COLUMNS))
         self.before = table.vector(3, ti.f64)
-        self.wait = hasattr(device, "find_blows")
+        # Boxes on one structure resolve their impacts together.
+        self.wait = container.is_group and hasattr(device, "find_blows")
 
     @ti.kernel
     def start(self, initial: _F64):
@@ -145,42 +147,27 @@ class Coupling:
 
     @ti.func
     def _is_sound(self, first):
-        sound = self.status[first] == 0
-        if ti.static(self.container.is_group):
-            for s in range(first, first + self.container.scenes()):
-                if self.status[s] != 0:
-                    sound = False
+        sound = True
+        for k in range(self.container.scenes()):
+            if self.status[first + k] != 0:
+                sound = False
         return sound
 
     @ti.func
     def _advance_step(self, first):
         """The order of a step: fillings, container, clock, measures, divergence."""
-        if ti.static(self.container.is_group):
-            self._advance_group(first)
-        else:
-            before = self.container.motion(first)
-            self._record(first, before)
-            action = self.device.advance(first, self.step[first], before)
-            self.container.set_action(first, action)
-            attempts = self.container.advance(first)
-            self._book(first, before, action, attempts)
-
-    @ti.func
-    def _advance_group(self, first):
-        """The same of a group, whose motions wait in memory."""
-        end = first + self.container.scenes()
-        for s in range(first, end):
+        # From 0, as the compiler then knows that a scene of its own takes one round.
+        for k in range(self.container.scenes()):
+            s = first + k
             motion = self.container.motion(s)
             self.before[s] = ti.Vector([motion.x, motion.v, motion.a])
             self._record(s, motion)
         self._set_actions(first)
         attempts = self.container.advance(first)
-        for s in range(first, end):
-            ours = 0
-            if s == first:
-                ours = attempts
+        for k in range(self.container.scenes()):
+            s = first + k
             action = Action(self.container.impulse[s], self.container.carried[s])
-            self._book(s, self._motion_before(s), action, ours)
+            self._book(s, self._motion_before(s), action, attempts if k == 0 else 0)
 
     @ti.func
     def _motion_before(self, s):
@@ -191,14 +178,14 @@ class Coupling:
     @ti.func
     def _set_actions(self, first):
         """Actions of the fillings on the container; scenes without a box have none."""
-        end = first + self.container.boxed[None]
         if ti.static(self.wait):
-            for s in range(first, end):
+            for k in range(self.container.boxes()):
+                s = first + k
                 blows = self.device.find_blows(s, self.step[s], self._motion_before(s))
                 self.container.set_blows(s, blows)
             self.container.resolve(first)
-        for s in range(first, end):
-            action = Action(0.0, 0.0)
+        for k in range(self.container.boxes()):
+            s, action = first + k, Action(0.0, 0.0)
             if ti.static(self.wait):
                 recoil = self.container.recoil_of(s)
                 action = self.device.carry_out(s, self.step[s], self._motion_before(s), recoil)

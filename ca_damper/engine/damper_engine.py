@@ -4,14 +4,15 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ca_damper.engine.container import container_of
+from ca_damper.engine.container import Container
 from ca_damper.engine.coupling import Coupling, MomentumAccount
-from ca_damper.engine.modal_container import ModalContainer
-from ca_damper.engine.recorder import ROOM, Recorder
+from ca_damper.engine.mount import Mount, MountKind
+from ca_damper.engine.recorder import ROOM, SampleRecorder
 from ca_damper.engine.signals import DeviceExcitation
+from ca_damper.engine.sine_container import SineContainer
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.filling import LEAST_PLACES, Fillings
-from ca_damper.scenes.clock import Clock
+from ca_damper.scenes.clock import CycleClock
 from ca_damper.scenes.gravity import gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
@@ -30,7 +31,7 @@ class EngineStructure:
     """Compiled structure of a batch: its filling's structure, mount, excitation, names of sizes."""
 
     key: Hashable
-    mount: Hashable
+    mount: MountKind
     excitation: ExcitationKind
     sizes: tuple[str, ...]
     filling: Any = field(compare=False)
@@ -51,16 +52,13 @@ class DamperEngine(Engine):
         scenes, cycles, samples, *places = self.capacity
         sizes = dict(zip(self.structure.sizes, places))
         self.table = SceneFields(scenes, {"cycles": cycles, "samples": samples, **sizes})
-        self.clock = Clock(self.table)
-        self.account, self.recorder = MomentumAccount(self.table), Recorder(self.table)
-        mount: Any = self.structure.mount
-        kind = self.structure.excitation
+        self.clock = CycleClock(self.table)
+        self.account, self.recorder = MomentumAccount(self.table), SampleRecorder(self.table)
+        mount, kind = self.structure.mount, self.structure.excitation
         self.excitation = DeviceExcitation(self.table, self.clock, kind)
-        if isinstance(mount, int):
-            self.container = ModalContainer(self.table, self.excitation, mount)
-        else:
-            is_sine = kind == ExcitationKind()
-            self.container = container_of(mount, self.table, self.clock, self.excitation, is_sine)
+        is_sine = mount.word == "spring" and kind == ExcitationKind()
+        container = SineContainer if is_sine else Container
+        self.container = container(self.table, self.clock, self.excitation, mount)
         self.device = self.structure.filling.bind(self.table)
         parts = self.container, self.device, self.account, self.recorder
         self.coupling = Coupling(self.table, self.clock, *parts)
@@ -70,6 +68,7 @@ class DamperEngine(Engine):
         self,
         fillings: Fillings,
         table: SceneTable,
+        mount: Mount,
         rtol: float,
         atol: float,
         excitation: Excitation,
@@ -78,7 +77,7 @@ class DamperEngine(Engine):
         self.table.load(table)
         fillings.write(self.table.gravity, gravity_along)
         fillings.write(self.table.weight, lambda one: one.particle_mass * gravity_along(one))
-        self.container.load(rtol, atol)
+        self.container.load(mount, mount.numbers(table), rtol, atol)
         self.excitation.load(excitation)
         self.device.load(fillings)
 
@@ -88,7 +87,7 @@ _POOL = EnginePool(DamperEngine, _LEAST)
 
 def borrow(
     fillings: Fillings,
-    mount: Hashable,
+    mount: MountKind,
     kind: ExcitationKind,
     counts: tuple[int, int, int],
     more: dict[str, int],

@@ -7,7 +7,7 @@ import numpy as np
 
 from ca_damper.engine.coupling import CUT_SHORT, LOST
 from ca_damper.engine.damper_engine import DamperEngine
-from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.engine.mount import Mount
 from ca_damper.errors import SimulationDiverged
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.filling import Fillings
@@ -34,7 +34,7 @@ class LoadedScenes:
     fillings: Fillings
     count: int
     if_diverged: str
-    modal: ModalMount | None
+    support: Mount
     measured_cycles: int
     recorded_samples: int
     numbers: SceneNumbers
@@ -49,7 +49,7 @@ class LoadedScenes:
     def diverged(self) -> np.ndarray:
         """Scenes that have diverged, and those on one structure with them, (scenes,) of bool."""
         lost: np.ndarray = self._read_status()[2] != 0
-        group = 1 if self.modal is None else self.modal.group
+        group = self.support.group
         return np.repeat(lost.reshape(-1, group).any(axis=1), group)
 
     @property

@@ -15,7 +15,7 @@ LATEST, ROOM = ("a", "force", "energy", "momentum"), 32
 
 
 @ti.data_oriented
-class Recorder:
+class SampleRecorder:
     """Samples of every scene, every so many steps of a run."""
 
     def __init__(self, table: SceneFields):

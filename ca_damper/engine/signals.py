@@ -7,8 +7,7 @@ import taichi as ti
 
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.excitation.signal import Signal
-from ca_damper.oscillator import sine_and_cosine as of_small
-from ca_damper.scenes.clock import Clock, added
+from ca_damper.scenes.clock import CycleClock, added, small_turn
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 
@@ -20,7 +19,7 @@ class DeviceSignal:
     # Written by ``load``, so that a checkpoint leaves them out.
     constant_fields = ("nodes", "last", "step")
 
-    def __init__(self, table: SceneFields, clock: Clock, role: str):
+    def __init__(self, table: SceneFields, clock: CycleClock, role: str):
         self.role = role
         self.nodes = ti.Vector.field(2, ti.f64, shape=table.length(f"{role}_nodes"))
         self.last, self.step = ti.field(ti.i32, shape=()), ti.field(ti.f64, shape=())
@@ -56,7 +55,7 @@ class DeviceSignal:
 class SineBase:
     """A base that moves by the sine of the scenes' table."""
 
-    def __init__(self, table: SceneFields, clock: Clock, role: str):
+    def __init__(self, table: SceneFields, clock: CycleClock, role: str):
         self.table, self.clock = table, clock
 
     def load(self, excitation: Excitation) -> None:
@@ -66,8 +65,7 @@ class SineBase:
     def at(self, s, start, t):
         """The clock's phase, turned on by the time since the step began."""
         omega, y0 = 2.0 * ti.math.pi * self.table.frequency[s], self.table.base_amplitude[s]
-        sine, cosine = of_small(omega * t)
-        phase = added(self.clock.circle[s], ti.Vector([sine, cosine]))
+        phase = added(self.clock.circle[s], small_turn(omega * t))
         return y0 * ti.Vector([phase[0], omega * phase[1], -omega * omega * phase[0]])
 
     @ti.func
@@ -102,7 +100,7 @@ _FORCES = {"none": NoForce, "signal": DeviceSignal}
 class DeviceExcitation:
     """Base and force of an excitation of some kind."""
 
-    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind):
+    def __init__(self, table: SceneFields, clock: CycleClock, kind: ExcitationKind):
         self.base = _BASES[kind.base](table, clock, "base")
         self.force = _FORCES[kind.force](table, clock, "force")
 

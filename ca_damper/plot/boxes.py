@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
-from ca_damper.report.record import Frame, inner_size
+from ca_damper.report.record import SceneFrame, inner_size
 from taichi_dem.kit.plot_style import (
     BLACK,
     BLUE,
@@ -39,7 +39,7 @@ _SMALL |= dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"
 
 
 @dataclass(frozen=True)
-class Box:
+class BoxSize:
     """Inside of the container: width and height [m], and the diameter of a particle [m]."""
 
     width: float
@@ -85,7 +85,7 @@ class Box:
 class DrawnBox:
     """Walls and particles in a panel, in millimetres; ``show`` moves them."""
 
-    def __init__(self, axes: Any, box: Box, fastest: float, offset: float = 0.0):
+    def __init__(self, axes: Any, box: BoxSize, fastest: float, offset: float = 0.0):
         self.box, self.offset = box, offset
         (self.walls,) = axes.plot([], [], color=BLACK, linewidth=1.2, solid_joinstyle="miter")
         size = 1e3 * box.diameter
@@ -96,8 +96,8 @@ class DrawnBox:
         )  # fmt: skip
         axes.add_collection(self.particles)
 
-    def show(self, frame: Frame) -> None:
-        """Draw a ``record.Frame``."""
+    def show(self, frame: SceneFrame) -> None:
+        """Draw a ``record.SceneFrame``."""
         shift = np.array([self.offset, self.box.lift(frame.x)])
         walls = 1e3 * (self.box.outline() + shift)
         self.walls.set_data(walls[:, 0], walls[:, 1])
@@ -108,7 +108,7 @@ class DrawnBox:
             self.particles.set_heights(1e3 * frame.diameter)
 
 
-def frame_panel(axes: Any, box: Box, amplitude: float, margin: float = 3.0) -> None:
+def frame_panel(axes: Any, box: BoxSize, amplitude: float, margin: float = 3.0) -> None:
     """Limits of a panel in which the box moves by an amplitude [m]; equal scales, no axes."""
     top = 1e3 * (box.height + amplitude) + margin
     if box.staggered:
@@ -187,8 +187,8 @@ class Hanging:
     """A container in a film: its name, its Box, its frames, and the curve beside it."""
 
     title: str
-    box: Box
-    frames: Sequence[Frame]
+    box: BoxSize
+    frames: Sequence[SceneFrame]
     colour: str
     curve: tuple[np.ndarray, np.ndarray] | None = None
 

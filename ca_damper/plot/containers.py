@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.plot.boxes import SPEEDS, Box, Hanging
-from ca_damper.report.record import Frame
+from ca_damper.plot.boxes import SPEEDS, BoxSize, Hanging
+from ca_damper.report.record import SceneFrame
 from ca_damper.spheres import Spheres
 from taichi_dem.kit.display import counted, listed, scale
 from taichi_dem.kit.plot_style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, table_of
@@ -26,7 +26,7 @@ def show_film(
     """Write the page of a ``Film``; scenes: numbers of those shown; as of ``Film.show``."""
     # A filling without a box of its own is drawn in that of the spheres.
     has_box = hasattr(film.filling, "columns") or hasattr(film.filling, "height")
-    box = Box.of(film.filling if has_box else Spheres())
+    box = BoxSize.of(film.filling if has_box else Spheres())
     containers = []
     for scene, colour in zip(scenes, _COLOURS):
         title = counted(len(film.frames[scene][0].position), "particle")
@@ -76,18 +76,18 @@ def show_containers(
     return show_page(path, open_browser, [_SCRIPT], data=data, notes=notes, **content)
 
 
-def _is_finite(row: Sequence[Frame]) -> bool:
+def _is_finite(row: Sequence[SceneFrame]) -> bool:
     values = (value for frame in row for value in (frame.x, frame.y, frame.position))
     return all(bool(np.isfinite(value).all()) for value in values)
 
 
-def _fastest(frames: Sequence[Sequence[Frame]]) -> float:
+def _fastest(frames: Sequence[Sequence[SceneFrame]]) -> float:
     """End of the colour scale: a speed that one of a hundred particles exceeds."""
     speeds = [np.abs(frame.velocity[:, 1]) for row in frames for frame in row]
     return float(np.percentile(np.concatenate([*speeds, [1e-9]]), 99)) or 1.0
 
 
-def _drawn(one: Hanging, frames: Sequence[Frame]) -> dict[str, Any]:
+def _drawn(one: Hanging, frames: Sequence[SceneFrame]) -> dict[str, Any]:
     """What is drawn of a container, in mm; frames: those that the page holds."""
     first, box = frames[0], one.box
     diameters = np.full(len(first.position), box.diameter)

@@ -204,7 +204,7 @@ class FilmMeasures:
 
     @classmethod
     def of(cls, box: Any, cycles: Any, phase: Any) -> Any:
-        """Measures of a Box with at least one particle; cycles: each a list of record.Frame."""
+        """Measures of a BoxSize with at least one particle; cycles: each a list of SceneFrame."""
         rows, near = [], 0.5 * box.diameter
         for frame in itertools.chain(*cycles):
             below, above = box.gaps(frame.position)

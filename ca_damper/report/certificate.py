@@ -141,18 +141,12 @@ def checked_range(batch: Any) -> CheckedRange | None:
     kinds, which = batch.fillings.kinds, batch.fillings.which
     if not hasattr(kinds[0], "checked_range"):
         return None
-    particles, mass, size, frequency = map(
-        batch.table.column, ("particles", "mass", "base_amplitude", "frequency")
+    particles, size, frequency = map(
+        batch.table.column, ("particles", "base_amplitude", "frequency")
     )
-    if batch.modal is not None:
-        places = np.resize(batch.modal.scene_places, batch.count)
-        recoils = np.array([batch.modal.structure.recoil(place) for place in places])
-        # Where nothing moves it is infinite.
-        mass = 1.0 / np.maximum(recoils, 1e-300)
-    elif batch.mount == "base":
-        mass = np.full(batch.count, np.inf)
     if batch.mount != "base" or batch.excitation.kind.base != "sine":
         size = np.full(batch.count, np.nan)
+    mass = batch.support.masses(batch.table)
     driven = particles, mass, size, size * (2.0 * np.pi * frequency) ** 2
     found: list[CheckedRange] = [
         kind.checked_range(Driven(*(of_all[which == k] for of_all in driven)))

@@ -10,7 +10,7 @@ from taichi_dem.kit.validation import shown
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class SceneFrame:
     """Snapshot of one scene.
 
     Parameters
@@ -39,13 +39,13 @@ class Frame:
     diameter: np.ndarray | None = None
 
 
-def frames_of(batch: Any, present: dict[str, np.ndarray] | None = None) -> tuple[Frame, ...]:
+def frames_of(batch: Any, present: dict[str, np.ndarray] | None = None) -> tuple[SceneFrame, ...]:
     """A Frame of every scene of a batch as it is now."""
     found = batch.sample() if present is None else present
     time_s, x, y = (found[name].tolist() for name in ("time_s", "x", "y"))
     shots = [batch.snapshot(s) for s in range(batch.count)]
     return tuple(
-        Frame(time_s[s], x[s], y[s], shot["position"], shot["velocity"], shot.get("diameter"))
+        SceneFrame(time_s[s], x[s], y[s], shot["position"], shot["velocity"], shot.get("diameter"))
         for s, shot in enumerate(shots)
     )
 

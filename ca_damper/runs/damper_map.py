@@ -12,7 +12,7 @@ from ca_damper.batch import Batch
 from ca_damper.filling import Filling, check_filling
 from ca_damper.report.progress import Stages
 from ca_damper.report.report import Report
-from ca_damper.runs.result import Result, scenes_over
+from ca_damper.runs.result import ScenesResult, scenes_over
 from ca_damper.scenes.checks import STARTS, check_run, run_seeds
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
@@ -42,7 +42,7 @@ _UNITS |= dict.fromkeys(("loss", "mass_share", "energy"), "1")
 
 
 @dataclass(frozen=True, eq=False)
-class DamperMap(Result):
+class DamperMap(ScenesResult):
     """Measures of a container that is driven as A sin(2 pi f t), whatever its filling does.
 
     The axes of all measures are clearances, particles, amplitudes, frequencies, seeds, in this

@@ -9,7 +9,7 @@ import numpy as np
 from ca_damper.engine.recorder import ROOM
 from ca_damper.report.measures import SAMPLE_UNITS
 from ca_damper.report.progress import Stages
-from ca_damper.report.record import Frame, frames_of
+from ca_damper.report.record import SceneFrame, frames_of
 from taichi_dem.kit.data_table import dataset
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
@@ -38,7 +38,7 @@ class Film:
     """
 
     history: dict[str, np.ndarray]
-    frames: tuple[tuple[Frame, ...], ...]
+    frames: tuple[tuple[SceneFrame, ...], ...]
     filling: Any = None
     mount: str = "spring"
 

@@ -10,13 +10,13 @@ import numpy as np
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.report import Report
-from ca_damper.runs.result import Result
+from ca_damper.runs.result import ScenesResult
 from ca_damper.structure import ModalStructure
 from taichi_dem.kit.display import counted, in_brief, listed
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class History(Result):
+class MotionHistory(ScenesResult):
     """Base of time histories; a scene has a place and a seed."""
 
     label: str
@@ -76,7 +76,7 @@ class History(Result):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class TimeHistory(History):
+class TimeHistory(MotionHistory):
     """Motions of containers under one excitation: the places are the numbers of particles.
 
     Parameters
@@ -132,7 +132,7 @@ class TimeHistory(History):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class StructureHistory(History):
+class StructureHistory(MotionHistory):
     """Motions of a structure with boxes; in its report a place without a box is a scene too.
 
     Parameters

@@ -13,7 +13,7 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.report.measures import MEASURE_UNITS, Cycles, column_of, peak
 from ca_damper.report.report import Report
 from ca_damper.report.steady_state import LEAST_TESTED, change_of_halves, half_width
-from ca_damper.runs.result import Result, scenes_over
+from ca_damper.runs.result import ScenesResult, scenes_over
 from ca_damper.scenes.checks import check_run, run_seeds
 from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
@@ -44,7 +44,7 @@ _PEAK_COLUMNS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Response(Result):
+class Response(ScenesResult):
     """Response curves of a filling; every measure is an array (particles, ratios, seeds).
 
     A notebook shows its curves and a table of the peaks; a peak at an end of the ratios is marked
@@ -177,7 +177,7 @@ class Response(Result):
         return {name: (dims, getattr(self, name), unit) for name, unit in self.units.items()}
 
     def to_xarray(self) -> Any:
-        """As of ``Result``, over particles, frequency and seed; ``ratio`` is along frequency."""
+        """As of ``ScenesResult``; ``ratio`` is along frequency."""
         ratio = "frequency", self.ratios, {"units": "1"}
         return super().to_xarray().assign_coords(ratio=ratio)
 

@@ -10,7 +10,7 @@ from taichi_dem.kit.data_table import Tabulated, dataset
 from taichi_dem.kit.errors import InputError
 
 
-class Result(Tabulated):
+class ScenesResult(Tabulated):
     """Values of scenes over named axes; ``label`` is a short word for the filling."""
 
     label: str

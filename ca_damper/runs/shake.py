@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ca_damper.batch import Batch
-from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.engine.mount import ModalMount
 from ca_damper.excitation.excitation import Excitation, excitation_of
 from ca_damper.excitation.signal import Signal
 from ca_damper.filling import Filling, check_filling

@@ -16,7 +16,7 @@ _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
 class SceneNumbers:
     """A table whose steps are shortened so that a whole number of them makes a cycle."""
 
-    def __init__(self, fillings: Any, table: SceneTable, has_box: np.ndarray | None = None):
+    def __init__(self, fillings: Any, table: SceneTable, has_box: np.ndarray):
         self.fillings, self.table = fillings, table.copy()
         self.has_box = has_box
         self.largest_dt = self.table.column("dt")
@@ -27,9 +27,9 @@ class SceneNumbers:
         asked = zip(frequency, self.largest_dt)
         steps = np.array([steps_per_cycle(float(f), float(dt)) for f, dt in asked], np.int32)
         dt = 1.0 / (frequency * steps)
-        checked = slice(None) if self.has_box is None else self.has_box
         columns = self.fillings.which, self.table.column("particles"), dt
-        for k, particles, step in sorted(set(zip(*(one[checked].tolist() for one in columns)))):
+        boxed = (column[self.has_box].tolist() for column in columns)
+        for k, particles, step in sorted(set(zip(*boxed))):
             self.fillings.kinds[k].check(particles, step)
         self.table.drive(frequency, dt)
         self.steps_per_cycle = steps

@@ -42,7 +42,7 @@ def _body(options: Any) -> dict[str, Any]:
 
 
 @ti.data_oriented
-class Bodies:
+class SphereBodies:
     """State of the spheres; sphere k of scene s has the index i = s * stride + k.
 
     (horizontal, vertical), in the frame at rest. Horizontal positions count from the middle of the

@@ -192,7 +192,7 @@ def _runge_kutta(y, u, alpha, power):
 
 
 @ti.data_oriented
-class ContactLaw:
+class SphereContactLaw:
     """Forces of a contact under a damping law: "tsuji" (p = 1/4) or "printed" (p = 1/2)."""
 
     def __init__(self, name: str):

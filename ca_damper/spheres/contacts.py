@@ -5,7 +5,7 @@ import taichi as ti
 from ca_damper.filling import Fillings
 from ca_damper.spheres.contact_law import (
     Contact,
-    ContactLaw,
+    SphereContactLaw,
     contact_members,
     pair_numbers,
     wall_numbers,
@@ -20,7 +20,7 @@ vec3 = ti.types.vector(3, ti.f64)
 
 
 @ti.dataclass
-class Contacts:
+class ContactLanes:
     """Numbers of so many contacts, those of ``Contact`` as a vector each."""
 
     stiffness: lanes
@@ -40,7 +40,7 @@ class OfSizes:
 
     constant_fields = ("contact",)
 
-    def __init__(self, law: ContactLaw, rotation: Rotation, count: int):
+    def __init__(self, law: SphereContactLaw, rotation: Rotation, count: int):
         self.law, self.rotation, self.bodies = law, rotation, rotation.bodies
         self.table, self.kinds = self.bodies.table, self.bodies.kinds
         self.contact = self.table.structs(Contact, count)
@@ -54,7 +54,7 @@ class OfSizes:
 class PairContacts(OfSizes):
     """Contacts of two spheres; contact: one for each pair of sizes, (scenes, kinds * kinds)."""
 
-    def __init__(self, law: ContactLaw, rotation: Rotation):
+    def __init__(self, law: SphereContactLaw, rotation: Rotation):
         super().__init__(law, rotation, rotation.bodies.kinds**2)
 
     def _contacts(self, options):
@@ -92,7 +92,7 @@ class PairContacts(OfSizes):
         if ti.static(self.kinds == 1):
             return contact
         found = [self.between(s, *pairs[k], contact) for k in ti.static(range(LANES))]
-        return Contacts(
+        return ContactLanes(
             stiffness=ti.Vector([found[k].stiffness for k in ti.static(range(LANES))]),
             damping=ti.Vector([found[k].damping for k in ti.static(range(LANES))]),
             friction=ti.Vector([found[k].friction for k in ti.static(range(LANES))]),
@@ -110,7 +110,7 @@ class PairContacts(OfSizes):
 class WallContacts(OfSizes):
     """Contacts of a sphere with the walls, by scene and size of spheres."""
 
-    def __init__(self, law: ContactLaw, rotation: Rotation):
+    def __init__(self, law: SphereContactLaw, rotation: Rotation):
         super().__init__(law, rotation, rotation.bodies.kinds)
         self.recoiling = self.table.vector(3, ti.f64, self.kinds)
 

@@ -8,12 +8,12 @@ import taichi as ti
 
 from ca_damper.filling import Action, Fillings
 from ca_damper.scenes.scene_fields import SceneFields
-from ca_damper.spheres.bodies import Bodies, vec2
-from ca_damper.spheres.contact_law import ContactLaw
+from ca_damper.spheres.bodies import SphereBodies, vec2
+from ca_damper.spheres.contact_law import SphereContactLaw
 from ca_damper.spheres.contacts import PairContacts, WallContacts
 from ca_damper.spheres.effect_activity import PAIRS, WALLS, EffectActivity
 from ca_damper.spheres.expected_contacts import SEARCHES
-from ca_damper.spheres.forces import PairForces, WallForces
+from ca_damper.spheres.forces import SpherePairForces, WallForces
 from ca_damper.spheres.friction_history import FrictionHistory
 from ca_damper.spheres.rotation import Rotation
 from taichi_dem.kit.allocation import values
@@ -46,15 +46,15 @@ class DeviceSpheres:
     def __init__(self, options: Any, table: SceneFields):
         self.table, self.rubs = table, options.rubs
         given = options.start is not None, options.start_velocity is not None
-        self.bodies = Bodies(table, *given, len(options.radii))
-        self.law, self.effect_activity = ContactLaw(options.damping), EffectActivity(table)
+        self.bodies = SphereBodies(table, *given, len(options.radii))
+        self.law, self.effect_activity = SphereContactLaw(options.damping), EffectActivity(table)
         self.rotation = Rotation(self.bodies, options.rotation)
         self.search = SEARCHES[options.search](table, self.bodies)
         self.pair_contacts = PairContacts(self.law, self.rotation)
         self.wall_contacts = WallContacts(self.law, self.rotation)
         self.history = FrictionHistory(self.pair_contacts, options.remembers)
         shared = self.search, self.history, self.effect_activity, self.rubs
-        self.pair_forces = PairForces(self.pair_contacts, *shared)
+        self.pair_forces = SpherePairForces(self.pair_contacts, *shared)
         self.wall_forces = WallForces(self.wall_contacts, *shared)
         self.crushed, self.speed = table.field(ti.i32), table.field(ti.f64)
         self.given, self.lost = table.field(ti.f64), table.field(ti.f64)

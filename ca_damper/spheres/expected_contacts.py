@@ -4,7 +4,7 @@ import taichi as ti
 
 from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
-from ca_damper.spheres.bodies import Bodies, vec2
+from ca_damper.spheres.bodies import SphereBodies, vec2
 from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList
 
 vec2i = ti.types.vector(2, ti.i32)
@@ -23,7 +23,7 @@ _NEARLY_ALL = 3
 class ExpectedContacts:
     """Lists of the pairs and of the spheres at walls that are tested in every step."""
 
-    def __init__(self, table: SceneFields, bodies: Bodies):
+    def __init__(self, table: SceneFields, bodies: SphereBodies):
         self.table, self.bodies, self.cells = table, bodies, CellList(table, bodies)
         self.full = self.cells.full
         self.pair = table.vector(2, ti.i32, 2, "pairs")

@@ -10,7 +10,7 @@ from ca_damper.spheres.effect_activity import FRICTION, EffectActivity
 from ca_damper.spheres.friction_history import FrictionHistory
 
 
-class Forces:
+class SphereForces:
     """Base of the forces in contacts; rubs: whether there is friction."""
 
     def __init__(
@@ -27,7 +27,7 @@ class Forces:
 
 
 @ti.data_oriented
-class PairForces(Forces):
+class SpherePairForces(SphereForces):
     """Contacts of two spheres in the present step, by scene."""
 
     scratch_fields = ("force_x", "force_y", "torque", "spring", "root")
@@ -133,7 +133,7 @@ class PairForces(Forces):
 
 
 @ti.data_oriented
-class WallForces(Forces):
+class WallForces(SphereForces):
     """Contacts of walls and of the spheres that are expected to touch them."""
 
     @ti.func

@@ -3,7 +3,7 @@
 import numpy as np
 import taichi as ti
 
-from ca_damper.spheres.bodies import Bodies
+from ca_damper.spheres.bodies import SphereBodies
 from taichi_dem.kit.allocation import values
 
 
@@ -11,7 +11,7 @@ from taichi_dem.kit.allocation import values
 class Rotation:
     """Turning of solid spheres in the plane, of moment of inertia 2/5 m r^2; or no trace of it."""
 
-    def __init__(self, bodies: Bodies, turns: bool):
+    def __init__(self, bodies: SphereBodies, turns: bool):
         self.bodies, self.turns = bodies, turns
         # An impulse on a solid sphere's surface moves it like 1 / (1 + 5/2) of its mass.
         self.tangential_share = 2.0 / 7.0 if turns else 1.0

@@ -6,7 +6,7 @@ import taichi as ti
 
 from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
-from ca_damper.spheres.bodies import Bodies, vec2
+from ca_damper.spheres.bodies import SphereBodies, vec2
 
 # Pairs near each other per sphere. Discs of one size have three, at most five with the skin.
 _PAIRS_PER_SPHERE = 8
@@ -16,7 +16,7 @@ EXPECTED, TOUCHING = range(2)
 
 
 @ti.dataclass
-class Grid:
+class SearchGrid:
     """Numbers of the search of a scene.
 
     skin: how far apart spheres are listed [m]; it changes the time taken and no result.
@@ -32,7 +32,7 @@ class Grid:
 class AllPairs:
     """Test every pair and every sphere in every step, as the paper does."""
 
-    def __init__(self, table: SceneFields, bodies: Bodies):
+    def __init__(self, table: SceneFields, bodies: SphereBodies):
         self.table, self.bodies = table, bodies
         self.places = table.length("pairs")
         self.pair = table.vector(2, ti.i32, 2, "pairs")
@@ -99,11 +99,11 @@ class CellList:
 
     constant_fields = ("grid",)
 
-    def __init__(self, table: SceneFields, bodies: Bodies):
+    def __init__(self, table: SceneFields, bodies: SphereBodies):
         self.bodies = bodies
         # A cell is larger than a sphere: there are no more of them.
         self.cell_stride, self.list_stride = table.length("spheres"), table.length("pairs")
-        self.grid = table.structs(Grid)
+        self.grid = table.structs(SearchGrid)
         self.cell_first = table.field(ti.i32, "spheres", flat=True)
         self.next = table.field(ti.i32, "spheres", flat=True)
         self.pair = table.vector(2, ti.i32, "pairs", flat=True)

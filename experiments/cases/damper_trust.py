@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 import ca_damper as ca
-from ca_damper.plot.boxes import Box
+from ca_damper.plot.boxes import BoxSize
 from ca_damper.plot.curves import FilmMeasures
 from ca_damper.report.measures import first_harmonic, peak
 from ca_damper.runs.grains import DENSITY, Grains, diameter_of
@@ -151,7 +151,7 @@ def swing(filling, options):
         every = {"sample_every": steps, "frame_every": steps // FRAMES, **SILENT}
         for _ in range(options.filmed):
             shots += [cycle[:FRAMES] for cycle in ca.film(batch, steps, **every).frames]
-        height = FilmMeasures.of(Box.of(filling), shots, phase).mean_height_mm
+        height = FilmMeasures.of(BoxSize.of(filling), shots, phase).mean_height_mm
         values[f"swing_mm_N{count}"], values[f"lag_deg_N{count}"] = first_harmonic(phase, height)
     return values, None
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ca_damper import RigidMass
-from ca_damper.plot.boxes import Box
+from ca_damper.plot.boxes import BoxSize
 from taichi_dem import InputError, SimulationDiverged, runtime, simulate
 from taichi_dem.observers import Every
 from taichi_dem.report.energy_balance import unexplained_share
@@ -114,7 +114,7 @@ def run_from_rest(batch):
 
 def assert_inside(filling, place):
     """All particles lie in the box."""
-    box = Box.of(filling)
+    box = BoxSize.of(filling)
     # In an automaton every other column stands half a cell higher, and one may be under way.
     slack = box.diameter * (1.0 if box.staggered else 0.5)
     top = np.array([box.width, box.height + 0.5 * slack])

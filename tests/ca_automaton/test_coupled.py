@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ca_damper import Automaton, Batch, Oscillator, SceneTable, needed_effects
-from ca_damper.plot.boxes import Box
+from ca_damper.plot.boxes import BoxSize
 from ca_damper.report.certificate import checked_range
 from taichi_dem.kit.allocation import assign, values
 from tests.damper import expected, paper
@@ -48,7 +48,7 @@ def test_momentum_is_exact_and_no_grain_is_lost():
         for s, count in enumerate(particles.tolist()):
             position = batch.snapshot(s)["position"]
             assert len(position) == count
-            below, above = Box.of(batch.filling).gaps(position)
+            below, above = BoxSize.of(batch.filling).gaps(position)
             # Half a cell into the wall would be in a cell of the wall.
             assert min(below.min(), above.min()) > -0.5 * WIDTH
     assert batch.report().momentum_error < 2e-12

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from ca_damper.automaton.collisions import deflected, speed_after_pair, speed_after_wall
 from ca_damper.automaton.lattice import (
     DIRECTIONS,
     DOWN,
     UP,
-    Geometry,
+    LatticeGeometry,
     alignments,
     unit_vectors,
 )
+from ca_damper.automaton.paper.collisions import deflected, speed_after_pair, speed_after_wall
 from ca_damper.engine.random_numbers import DEFLECT, EVENT, PURPOSES, uniform
 
 ARRAY = ti.types.ndarray(dtype=ti.f64, ndim=1)
@@ -55,7 +55,7 @@ def test_deflection_sends_half_straight_back_and_a_quarter_to_each_side():
         assert list(turn) == [3, 3, 2, 2, 4, 4]
 
 
-BOX, WIDTH = Geometry(10, 16), 6e-3
+BOX, WIDTH = LatticeGeometry(10, 16), 6e-3
 
 
 def test_inner_cells_have_six_neighbours_where_the_triangles_put_them():

@@ -14,7 +14,7 @@ from ca_damper import (
     excitation,
     shake_structure,
 )
-from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.engine.mount import ModalMount
 from ca_damper.errors import InputError
 from ca_damper.filling import Blows
 from tests.ca_modes.frames import frame, two_storeys

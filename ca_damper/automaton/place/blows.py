@@ -11,7 +11,7 @@ from ca_damper.automaton.place.contacts import (
     JOIN,
     LINE,
     OBLIQUE,
-    Contacts,
+    GrainContacts,
     chord,
     common_velocity,
     dragged,
@@ -29,7 +29,7 @@ from ca_damper.filling import Blows, Recoil
 class Collisions(OnCells):
     """Carry out the collisions of a step; no two of them change the same grain."""
 
-    def __init__(self, contacts: Contacts, event_counts: EventCounts, tilted: bool):
+    def __init__(self, contacts: GrainContacts, event_counts: EventCounts, tilted: bool):
         super().__init__(contacts.cells)
         self.contacts, self.resting = contacts, contacts.resting
         self.event_counts, self.tilted = event_counts, tilted

@@ -88,7 +88,7 @@ def most_drag(slip, share):
 
 
 @ti.data_oriented
-class Contacts(OnCells):
+class GrainContacts(OnCells):
     """Find the events of a step and the grains that each of them needs.
 
     shared: hash of seed and step, read where an event is noted: it keeps the compiler from

@@ -10,7 +10,7 @@ from ca_damper.automaton.static_contact import StaticContact
 
 
 @ti.data_oriented
-class Grains(Cells):
+class GrainCells(Cells):
     """Cells of grains that fly any way: kind UP, speed and travelled signed, across to the right.
 
     container: its velocity [m/s]; this and its offset are those at the end of the step without

@@ -7,7 +7,7 @@ from ca_damper.automaton.cells import OnCells
 from ca_damper.automaton.conflict_resolution import rank_in_phase
 from ca_damper.automaton.lattice import EMPTY, UP
 from ca_damper.automaton.place.contacts import dragged, most_drag
-from ca_damper.automaton.place.grains import Grains
+from ca_damper.automaton.place.grains import GrainCells
 from ca_damper.engine.random_numbers import HOP, bits, unit
 
 #: Phases of a step after that of the blows, by rising rank.
@@ -19,7 +19,7 @@ _NOWHERE = -1
 class Transport(OnCells):
     """Grains keep their places in the room when the lattice steps, and fly under full gravity."""
 
-    def __init__(self, grains: Grains, tilted: bool):
+    def __init__(self, grains: GrainCells, tilted: bool):
         super().__init__(grains)
         self.tilted, self.traversal = tilted, grains.traversal
         self.movers = self.table.field(ti.i16, "cells")

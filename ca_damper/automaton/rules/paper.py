@@ -8,12 +8,12 @@ import taichi as ti
 
 from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.cells import Cells
-from ca_damper.automaton.collisions import Collisions
 from ca_damper.automaton.device import LatticeDevice
 from ca_damper.automaton.lattice import DIRECTIONS, DOWN, EMPTY, HELD, WALL, unit_vectors
+from ca_damper.automaton.paper.collisions import PaperCollisions
+from ca_damper.automaton.paper.transport import READINGS, Accumulator, PaperTransport
 from ca_damper.automaton.rules.contract import Rules
 from ca_damper.automaton.static_contact import StaticContact
-from ca_damper.automaton.transport import READINGS, Accumulator, Transport
 from ca_damper.report.certificate import CheckedRange, Driven
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.validation import choice, flag, plain_fields
@@ -38,8 +38,8 @@ class PaperDevice(LatticeDevice):
         cells = Cells(self.lattice, self.parameters, listed, accounting)
         resting = StaticContact(cells, accumulator, rules.particles_rest)
         self.fill(automaton, cells, resting, DOWN)
-        self.transport = Transport(resting, accounting, self.event_counts)
-        self.collisions = Collisions(self.transport, rules.pair_rule == "both")
+        self.transport = PaperTransport(resting, accounting, self.event_counts)
+        self.collisions = PaperCollisions(self.transport, rules.pair_rule == "both")
 
     @ti.func
     def energy(self, s):

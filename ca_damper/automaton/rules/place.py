@@ -9,8 +9,8 @@ import taichi as ti
 from ca_damper.automaton.device import LatticeDevice
 from ca_damper.automaton.lattice import UP
 from ca_damper.automaton.place.blows import Collisions
-from ca_damper.automaton.place.contacts import Contacts
-from ca_damper.automaton.place.grains import Grains, Heap
+from ca_damper.automaton.place.contacts import GrainContacts
+from ca_damper.automaton.place.grains import GrainCells, Heap
 from ca_damper.automaton.place.transport import Transport
 from ca_damper.automaton.rules.contract import Rules
 from ca_damper.report.certificate import CheckedRange, Driven
@@ -33,11 +33,11 @@ class PlaceDevice(LatticeDevice):
     def __init__(self, automaton: Any, table: SceneFields):
         super().__init__(automaton, table, looks_ahead=False)
         tilted = gravity_across(automaton) != 0.0
-        grains = Grains(self.lattice, self.parameters, automaton.traversal == "list")
+        grains = GrainCells(self.lattice, self.parameters, automaton.traversal == "list")
         heap = Heap(grains, None, automaton.rules.static_contact)
         self.fill(automaton, grains, heap, UP)
         self.transport = Transport(grains, tilted)
-        self.collisions = automaton.rules.collisions(Contacts(heap), self.event_counts, tilted)
+        self.collisions = automaton.rules.collisions(GrainContacts(heap), self.event_counts, tilted)
 
     @ti.func
     def find_blows(self, s, step, motion):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ca_damper import Batch, SceneTable, SimulationDiverged
-from ca_damper.plot.boxes import Box
+from ca_damper.plot.boxes import BoxSize
 from cases.hard import Cases, damper_run
 from cases.hard.damper_run import ALL, AUTOMATA, EXACT, SPHERES, drive, fall, filling, spring
 
@@ -103,7 +103,7 @@ def mild(trial, cycles=3, what=None, particles=30, **options):
     what = what or filling(trial)
     run = drive(trial, what, particles, cycles, base_amplitude=MILD, **options)
     # All fly at twice the wall's speed, as high as the box.
-    most = run.mass * (2.0 * (run.omega * MILD) ** 2 + what.gravity * Box.of(what).height)
+    most = run.mass * (2.0 * (run.omega * MILD) ** 2 + what.gravity * BoxSize.of(what).height)
     trial.limit("energy [J]", run.column("energy"), most, "N m ((2 V)^2 / 2 + g H)")
 
 

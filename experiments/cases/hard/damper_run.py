@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ca_damper import Automaton, Batch, Empty, Oscillator, Paper, SceneTable, Spheres, film
-from ca_damper.plot.boxes import Box
+from ca_damper.plot.boxes import BoxSize
 from ca_damper.report.measures import COLUMNS
 
 FILLINGS = {
@@ -69,7 +69,7 @@ class Run:
         In an automaton one may be a cell under way, and every other column stands half a cell
         higher.
         """
-        place, box = self.batch.snapshot(0)["position"], Box.of(self.what)
+        place, box = self.batch.snapshot(0)["position"], BoxSize.of(self.what)
         slack = box.diameter * box.staggered
         top = np.array([box.width, box.height + 0.5 * slack])
         inside = ((place >= -slack) & (place <= top + slack)).all(axis=1)
@@ -116,7 +116,7 @@ class Run:
         what = self.what
         wall = self.omega * max(self.column("x_max").max(), -self.column("x_min").min())
         e = max(what.wall_restitution, what.restitution)
-        bound = wall * (1.0 + e) / (1.0 - e) + np.sqrt(2.0 * what.gravity * Box.of(what).height)
+        bound = wall * (1.0 + e) / (1.0 - e) + np.sqrt(2.0 * what.gravity * BoxSize.of(what).height)
         bound += 4.0 * what.gravity * self.row["dt"]
         fastest = np.linalg.norm(self.batch.snapshot(0)["velocity"], axis=1).max(initial=0.0)
         self.trial.limit("fastest [m/s]", fastest, bound, "V (1 + e) / (1 - e) + sqrt(2 g H)")

@@ -73,7 +73,7 @@ class Accumulator:
 
 
 @ti.data_oriented
-class Transport(OnCells):
+class PaperTransport(OnCells):
     """Flight of the particles, and how they follow the lattice."""
 
     def __init__(self, resting: StaticContact, accounting: Accounting, event_counts: EventCounts):

@@ -6,7 +6,7 @@ from ca_damper.automaton.cells import OnCells
 from ca_damper.automaton.conflict_resolution import rank
 from ca_damper.automaton.device import HOLDS, PAIRS, WALLS
 from ca_damper.automaton.lattice import DIRECTIONS, EMPTY, WALL, mirrored, turned_back
-from ca_damper.automaton.transport import Transport
+from ca_damper.automaton.paper.transport import PaperTransport
 from ca_damper.engine.random_numbers import DEFLECT, EVENT, bits, unit
 from ca_damper.filling import Recoil
 
@@ -40,10 +40,10 @@ def deflected(direction, draw):
 
 
 @ti.data_oriented
-class Collisions(OnCells):
+class PaperCollisions(OnCells):
     """Judge and carry out the events of a step."""
 
-    def __init__(self, transport: Transport, both: bool):
+    def __init__(self, transport: PaperTransport, both: bool):
         super().__init__(transport.cells)
         self.transport, self.both = transport, both
         self.resting, self.accumulator = transport.resting, transport.accumulator

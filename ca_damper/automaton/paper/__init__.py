@@ -1,0 +1,1 @@
+"""Rule set "paper": particles fly in six directions, and collide where their cells touch."""
