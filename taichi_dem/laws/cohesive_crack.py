@@ -81,13 +81,17 @@ class CohesiveCrack(BondLaw):
         return begin, ti.max(end, _LEAST_SPENT * begin)
 
     @ti.func
+    def _may_begin(self, m, stiffness, jump):
+        """Whether a traction is beyond the least limit of any direction: almost none is."""
+        opening, push = stiffness[0] * ti.max(0.0, jump[0]), stiffness[1]
+        size = opening * opening + push * push * squared(vec2(jump[1], jump[2]))
+        return size > self.law[m, 2]
+
+    @ti.func
     def begins(self, m, stiffness, jump):
         """1 where an intact unit comes near its limit at a jump [m], else 0."""
         near = 0
-        pull, push = stiffness[0] * ti.max(0.0, jump[0]), stiffness[1]
-        size = pull * pull + push * push * squared(vec2(jump[1], jump[2]))
-        # Almost every unit is far below the least limit of any direction.
-        if size > self.law[m, 2]:
+        if self._may_begin(m, stiffness, jump):
             opening, sliding = self._driving(m, stiffness, jump)
             begin, _ = self._limits(m, stiffness, _direction(opening, sliding))
             energy = opening / stiffness[0] + sliding / stiffness[1]
@@ -97,6 +101,14 @@ class CohesiveCrack(BondLaw):
     @ti.func
     def traction(self, m, u, stiffness, jump):
         """Traction [Pa] at a jump [m], and energy per area slipped away now [J/m^2]."""
+        traction, slipped = vec3(stiffness[0], stiffness[1], stiffness[1]) * jump, 0.0
+        if self.unit[u][0] > 0.0 or self._may_begin(m, stiffness, jump):
+            traction, slipped = self._softened(m, u, stiffness, jump)
+        return traction, slipped
+
+    @ti.func
+    def _softened(self, m, u, stiffness, jump):
+        """The same of a unit that is damaged, or may be from now on."""
         before = self.unit[u]
         unit = self._damaged(m, before, stiffness, jump)
         normal, sliding, slipped = stiffness[0] * jump[0], vec2(jump[1], jump[2]), 0.0
@@ -138,10 +150,10 @@ class CohesiveCrack(BondLaw):
     def failed(self, m, u, traction):
         """1 once a unit without damage left to take is not pressed, and another one is as far."""
         whole = ti.cast(0, ti.i32)
-        for q in range(3):
-            whole += ti.cast(self.unit[u - u % 3 + q][0] >= 1.0, ti.i32)
-        own = self.unit[u][0] >= 1.0 and traction[0] >= 0.0
-        return ti.cast(own and whole > 1, ti.i32)
+        if self.unit[u][0] >= 1.0 and traction[0] >= 0.0:
+            for q in range(3):
+                whole += ti.cast(self.unit[u - u % 3 + q][0] >= 1.0, ti.i32)
+        return ti.cast(whole > 1, ti.i32)
 
     @ti.func
     def acted(self, m, u, stiffness):
