@@ -9,6 +9,7 @@ displacement of the hole that is known to 4 %.
 
     python experiments/blast_ensemble.py                      # 100 blasts on all cores
     python experiments/blast_ensemble.py --scatter 0          # other meshes alone
+    python experiments/blast_ensemble.py --spread 0.1         # strength from bond to bond as well
     python experiments/blast_ensemble.py --members 1000       # adds to finished blasts
 
 ``sweep`` runs the blasts in parallel, one process per core. Finished blasts are kept, and the same
@@ -42,6 +43,7 @@ SETTINGS = {
     "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], default 5e-4"),
     "jitter": (1e-3, 1e-3, study.number(0, 0.05, open_low=False), "share of edges, default 0.001"),
     "scatter": (0.05, 0.05, study.number(0, 0.2, open_low=False), "of the strength, default 0.05"),
+    "spread": (0.0, 0.1, study.number(0, 0.3, open_low=False), "from bond to bond, default 0"),
     "seed": (0, 0, study.whole(0, 2**31), "seed of the ensemble, default 0"),
 }
 options_parser = partial(blast_parser, NAME, __doc__, (), settings=SETTINGS)
@@ -58,7 +60,9 @@ def blast(row):
     random = np.random.default_rng(row["seed"])
     mesh = moved(dem.read_mesh(row["mesh"]), row["jitter"], random)
     material = stronger(dem.CONCRETE, 1.0 + row["scatter"] * random.standard_normal())
-    scene = dem.Scene(mesh, material, "auto", loads=[effects.GasPressure()])
+    material = replace(material, strength_spread=row["spread"])
+    gas, seed = effects.GasPressure(), row["seed"] % 2**31
+    scene = dem.Scene(mesh, material, "auto", loads=[gas], seed=seed)
     given = {"until": row["until"], "samples": 1, "progress": None}
     result = dem.simulate(scene, method=dem.ImplicitDashpots(BLOCK_STEP), **given)
     hole = float(result.series["hole_radial_displacement_mm"][-1])
@@ -110,7 +114,7 @@ def run(options):
     """Blast, count, draw, print."""
     mesh, at = dem.read_mesh(options.mesh), study.output_paths(options.out)
     mesh.group_faces("hole")
-    names = ("mesh", "jitter", "scatter", "until")
+    names = ("mesh", "jitter", "scatter", "spread", "until")
     rows = [{name: getattr(options, name) for name in names} for _ in range(options.members)]
     # A second process would compile as well, which takes longer than four blasts.
     workers = 1 if options.quick else options.threads

@@ -9,12 +9,14 @@ slot and empty hole to let more rock move at a charge, and peak velocities to fa
 Each design runs on several meshes of two sizes. A bar is the 95 % range of the mean over meshes of
 the finer size, and the difference to the coarser one; what lies within it is "not distinguished".
 Rock and gas are assumed (granite; the pulse of the first paper's block), delays at 1/20 of real
-ones.
+ones. With --stress the rock is pressed by 20 MPa in one direction on the face and 2 MPa across it:
+cracks turn into the direction of the largest pressure.
 
     python experiments/tunnel_face.py --quick                    # two designs, one mesh: no bars
     python experiments/tunnel_face.py                            # needs gmsh: make mesh
     python experiments/tunnel_face.py --near 0.03                # 50,000 tetrahedra and more
     python experiments/tunnel_face.py --holes holes.csv          # beside the parallel holes
+    python experiments/tunnel_face.py --stress 45                # pressed at 45 degrees from x
     python experiments/tunnel_face.py --delay 2.5e-4 --exponent 1.4   # one by one; gas expands
 
 A row of holes.csv is a hole: x_m, y_m, length_m, and by choice angle_deg, charge_from_m, delay_s,
@@ -41,6 +43,8 @@ NAME = "tunnel_face"
 #: What is compared between designs, with its unit; colours of designs.
 COMPARED = {"beside_m_s": "m/s", "behind_m_s": "m/s", "exponent": "1", "radiated_kJ": "kJ"}
 COMPARED |= {"out_m3": "m3", "out_m_s": "m/s", "depth_m": "m"}
+#: What is compared in rock under stress as well.
+CRACKS = {"crack_deg": "degrees", "crack_alike": "1"}
 COLOURS = (GREY, BLUE, ORANGE, GREEN)
 #: Name of the design of a user's table; edges of the coarser meshes over the others.
 YOURS, COARSER = "yours", 1.4
@@ -57,6 +61,7 @@ SETTINGS = {
     "until": (2e-3, 8e-4, study.number(0, 1), "simulated time [s], 2e-3"),
     "delay": (0.0, 0.0, study.number(0, 1e-2, open_low=False), "between heights of holes [s], 0"),
     "exponent": (0.0, 0.0, study.number(0, 5, open_low=False), "of gas that expands; 0: none"),
+    "stress": (None, None, study.number(-90, 90), "largest pressure at [degrees] from x"),
     "holes": (None, None, str, "CSV file of holes, run beside the parallel ones"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
@@ -68,7 +73,7 @@ def fired(row):
     design = known.get(row["design"]) or tunnel.Design(read_holes(row["holes"]))
     mesh = tunnel.mesh_of(row["design"], design, row["near_m"], row["mesh"])
     looks = {"until": row["until_s"], "samples": 200, "frames": 16, "title": row["design"]}
-    scene = tunnel.scene_of(mesh, design, row["exponent"])
+    scene = tunnel.scene_of(mesh, design, row["exponent"], row.get("stress_deg"))
     return design, dem.simulate(scene, method=METHOD, **looks)
 
 
@@ -83,6 +88,7 @@ def rows_of(options):
     near = options.near or (tunnel.KEPT_NEAR if options.holes else 0.0)
     fixed = {"delay_s": options.delay, "until_s": options.until, "exponent": options.exponent}
     fixed |= {"holes": options.holes} if options.holes else {}
+    fixed |= {} if options.stress is None else {"stress_deg": options.stress}
     sizes = [near, COARSER * near] if options.meshes > 1 else [near]
     numbers = itertools.product(range(options.meshes), sizes, names)
     return [{"design": d, "near_m": n, "mesh": k, **fixed} for k, n, d in numbers]
@@ -124,10 +130,10 @@ def with_bars(rows):
     return mean.join(bar.add_suffix("_bar"))
 
 
-def compared(table):
+def compared(table, names):
     """Rows in words: value and bar of each design, and whether it differs from the first."""
     rows = []
-    for name, unit in COMPARED.items():
+    for name, unit in names.items():
         value, bar = table[name], table[f"{name}_bar"]
         apart = (value - value.iloc[0]).abs() > np.hypot(bar, bar.iloc[0])
         words = [f"{v:.3g} +- {b:.2g}" if b == b else f"{v:.3g}" for v, b in zip(value, bar)]
@@ -176,7 +182,8 @@ def run(options):
     """Fire all designs, draw, print."""
     (rows, first), folder = runs_of(options), study.begin(options)
     table = with_bars(rows)
-    study.print_table(compared(table), ["", *table.index])
+    names = COMPARED if options.stress is None else COMPARED | CRACKS
+    study.print_table(compared(table, names), ["", *table.index])
     rows.to_csv(folder / "runs.csv", index=False)
     table.to_csv(folder / "designs.csv")
     draw_peaks(folder / "peaks.png", first, table)
@@ -187,7 +194,7 @@ def run(options):
     figures = {
         f"{design.replace(' ', '_')}_{name}": (table.loc[design, name], unit)
         for design in table.index
-        for name, unit in COMPARED.items()
+        for name, unit in names.items()
     }
     figures["tetrahedra"] = int(rows.tetrahedra.max()), "1"
     study.finish(options, NAME, figures, [result.report for _, result in first.values()])

@@ -17,6 +17,7 @@ from taichi_dem.laws.sphere_geometry import SphereGeometry
 from taichi_dem.laws.walton_braun import WaltonBraun
 from taichi_dem.loads.pressure import ExpandingGas, GasPressure, Gravity, Pressure
 from taichi_dem.loads.supports import Fixed, PrescribedMotion, QuietBoundary, Roller
+from taichi_dem.loads.traction import Traction
 
 __all__ = [
     "BodyContact",
@@ -48,5 +49,6 @@ __all__ = [
     "StickingFriction",
     "Support",
     "TensionLaw",
+    "Traction",
     "WaltonBraun",
 ]

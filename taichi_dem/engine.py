@@ -36,7 +36,9 @@ class Structure:
         self.effects, self.method, self.on_demand = tuple(effects), method, on_demand
         self.geometry = next((e.geometry for e in self.effects if e.role == "contact"), None)
         kinds = tuple(map(type, (*self.effects, self.geometry)))
-        self.key = kinds, structure_of(method), on_demand
+        # Supports that turn have fields of their own.
+        turning = tuple(bool(getattr(effect, "turns", False)) for effect in self.effects)
+        self.key = kinds, structure_of(method), on_demand, turning
 
     def __eq__(self, other):
         return self.key == other.key

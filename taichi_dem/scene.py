@@ -20,16 +20,19 @@ from taichi_dem.kit.validation import (
     real_numbers,
     shown,
     told_apart,
+    whole,
     word,
 )
 from taichi_dem.laws.base import Effect, check_one_material
 from taichi_dem.laws.contracts import PARTS_OF_BOND
 from taichi_dem.laws.roles import AUTO, LISTED, ChosenEffects, check_effect, chosen_effects
+from taichi_dem.loads.traction import check_bonds, checked_stress, tensor_of, with_tractions
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials, body_materials
+from taichi_dem.materials.bond_strength import bond_strength, given_strength, strongest
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.topology import check_free, may_meet, parts_of
-from taichi_dem.state.model import MANY, names_of
+from taichi_dem.state.model import MANY, Model, names_of
 
 #: Share of an opening at which a law begins, and of a mean speed, at which no body wakes others.
 SLEEP = 1e-6
@@ -77,6 +80,17 @@ class Scene(Pictured):
         Spins likewise [rad/s]. Bodies that share a vector, all or a group, turn together as a rigid
         body about the centre of their volume: the velocities of that turn are added to
         ``velocity``. Rows are spins of the bodies about their own centres. None: no spin.
+    stress : sequence of float, optional
+        Stress at the start, components xx, yy, zz, xy, yz and zx [Pa], compression negative: every
+        bond begins with its traction. Supports hold it, and quiet boundaries, which get a
+        ``Traction`` of it; any other face is free, as if rock had just been taken away there. None:
+        no stress.
+    strength : array_like or function, optional
+        Strength of each bond over that of the material, (bond_count,), or a function of the middles
+        of their faces [m], (bond_count, 3), that returns it; times ``Material.strength_spread``.
+        None: 1.
+    seed : int, default 0
+        Seed of ``Material.strength_spread``, 0 to 2147483647.
 
     Attributes
     ----------
@@ -101,6 +115,9 @@ class Scene(Pictured):
     materials: Mapping[str, Material] = field(default_factory=dict)
     velocity: Any = None
     spin: Any = None
+    stress: Any = None
+    strength: Any = None
+    seed: int = 0
 
     #: Not among the options: arguments of ``State.set_motion``, none for a scene at rest.
     initial_motion: ClassVar[Mapping[str, np.ndarray]] = {}
@@ -117,9 +134,15 @@ class Scene(Pictured):
         object.__setattr__(self, "loads", _listed("loads", self.loads))
         object.__setattr__(self, "effects", _effects_of(self))
         _check_types(self)
+        if self.stress is not None:
+            object.__setattr__(self, "stress", checked_stress("stress", self.stress))
+            more = with_tractions(self.effects, self.stress)
+            object.__setattr__(self, "effects", ChosenEffects(more, self.effects.word))
         object.__setattr__(self, "sleep", _sleep_of(self))
         _check_roles(self.effects)
-        for material in laid.checked_pairs():
+        whole("seed", self.seed, 0, 2**31 - 1)
+        factor = bond_strength(laid, self.strength, self.seed)
+        for material in strongest(laid.checked_pairs(), factor):
             for effect in self.effects:
                 effect.check_material(material)
         for effect in self.effects:
@@ -129,6 +152,8 @@ class Scene(Pictured):
                 check_free(self.mesh, effect.group)
         object.__setattr__(self, "max_speed", positive("max_speed", self.max_speed))
         object.__setattr__(self, "initial_motion", _motion_of(self))
+        if self.stress is not None:
+            check_bonds(self.model())
 
     def __getstate__(self) -> dict[str, Any]:
         """All but functions, which no process can send to another: their rows instead."""
@@ -136,6 +161,8 @@ class Scene(Pictured):
         if callable(self.velocity) or callable(self.spin):
             rest = {"velocity": None, "spin": None}
             state.update({**rest, **self.initial_motion})
+        if callable(self.strength):
+            state["strength"] = given_strength(self.mesh, self.strength)
         return state
 
     def __repr__(self):
@@ -143,6 +170,12 @@ class Scene(Pictured):
         effects = ", ".join(name or type(effect).__name__ for name, effect in named)
         words = f"effects {effects}" if effects else "no effects"
         return in_brief(self, counted(self.mesh.body_count, "body"), words)
+
+    def model(self) -> Model:
+        """Return the scene as arrays of bodies, bonds and effects."""
+        stress = None if self.stress is None else tensor_of(self.stress)
+        factor = bond_strength(self.body_materials, self.strength, self.seed)
+        return Model(self.mesh, self.body_materials, self.effects, stress, factor)
 
     @property
     def on_demand(self) -> bool:

@@ -55,13 +55,17 @@ def block(size: float | Sequence[float], *, element: float, scatter: int | None 
     """
     lengths = (size,) * 3 if finite(size) else direction("size", size)
     x, y, z = (positive("size", length) for length in lengths)
-    element = _element(element, min(x, y, z), x * y * z)
-    sides = _box_sides(x, y, element)
-    return drawn_out([divided(_corners(x, y), element)], z, element, sides, _seed(scatter))
+    return _box(x, y, z, element, scatter)
 
 
 def beam(
-    *, length: float, width: float, height: float, element: float, scatter: int | None = None
+    *,
+    length: float,
+    width: float,
+    height: float,
+    element: float,
+    slit: Sequence[float] | None = None,
+    scatter: int | None = None,
 ) -> Mesh:
     """Make a beam along x from the origin.
 
@@ -75,17 +79,20 @@ def beam(
         Height along y [m].
     element : float
         Length of an edge [m], at most the smallest of them.
+    slit : sequence of float, optional
+        Middle, depth and width (x, depth, width) of a slit from the bottom upward through the whole
+        width [m], at least half an element wide.
     scatter : int, optional
         Seed of an unstructured mesh, 0 to 2147483647: without rows that cracks would follow.
 
     Returns
     -------
     Mesh
-        Groups left, right (its ends), bottom, top, back, front.
+        Groups left, right (its ends), bottom, top, back, front, and slit where it is.
     """
     given = {"length": length, "height": height, "width": width}
-    lengths = [positive(name, value) for name, value in given.items()]
-    return block(lengths, element=element, scatter=scatter)
+    x, y, z = (positive(name, value) for name, value in given.items())
+    return _box(x, y, z, element, scatter, slit=slit)
 
 
 def cylinder(*, radius: float, height: float, element: float, scatter: int | None = None) -> Mesh:
@@ -128,9 +135,10 @@ def plate(
     thickness: float,
     element: float,
     hole: float | Sequence[float] | None = None,
+    slit: Sequence[float] | None = None,
     scatter: int | None = None,
 ) -> Mesh:
-    """Make a plate from the origin, with a hole where asked for.
+    """Make a plate from the origin, with a hole or a slit where asked for.
 
     Parameters
     ----------
@@ -145,13 +153,16 @@ def plate(
     hole : float or sequence of float, optional
         Centre and diameter (x, y, diameter) of a round hole through the thickness [m]; one number
         is the diameter of a hole in the middle.
+    slit : sequence of float, optional
+        Middle, depth and width (x, depth, width) of a slit from the bottom upward through the whole
+        thickness [m], at least half an element wide.
     scatter : int, optional
         Seed of an unstructured mesh, 0 to 2147483647: without rows that cracks would follow.
 
     Returns
     -------
     Mesh
-        Groups left, right (x), bottom, top (y), back, front (z), and hole where it is.
+        Groups left, right (x), bottom, top (y), back, front (z), hole and slit where they are.
 
     Examples
     --------
@@ -161,13 +172,7 @@ def plate(
     """
     given = {"width": width, "height": height, "thickness": thickness}
     x, y, z = (positive(name, value) for name, value in given.items())
-    element = _element(element, min(x, y, z), x * y * z)
-    loops, sides = [divided(_corners(x, y), element)], _box_sides(x, y, element)
-    if hole is not None:
-        middle = _checked_hole(hole, x, y, element)
-        loops.append(circle(middle[:2], middle[2], element)[::-1])
-        sides["hole"] = _on_circle(middle[:2], middle[2], element)
-    return drawn_out(loops, z, element, sides, _seed(scatter))
+    return _box(x, y, z, element, scatter, hole, slit)
 
 
 def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
@@ -200,6 +205,22 @@ def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
     >>> bracket = from_surface("bracket.stl", element=0.005, scale=0.001)  # doctest: +SKIP
     """
     return filled_surface(path, element, scale)
+
+
+def _box(x, y, z, element, scatter, hole=None, slit=None):
+    """A box from the origin, with a hole and a slit through z where asked for."""
+    element = _element(element, min(x, y, z), x * y * z)
+    outline, sides, loops = _corners(x, y), _box_sides(x, y, element), []
+    if hole is not None:
+        middle = _checked_hole(hole, x, y, element)
+        loops.append(circle(middle[:2], middle[2], element)[::-1])
+        sides["hole"] = _on_circle(middle[:2], middle[2], element)
+    if slit is not None:
+        corners = _checked_slit(slit, x, y, element)
+        _check_apart(corners, loops, element)
+        outline = [outline[0], *corners, *outline[1:]]
+        sides["slit"] = _on_slit(corners, element)
+    return drawn_out([divided(outline, element), *loops], z, element, sides, _seed(scatter))
 
 
 def _element(element, smallest, volume):
@@ -251,3 +272,39 @@ def _checked_hole(hole, x, y, element):
             f"and as much between it and the edges, got {shown(hole)}"
         )
     return across, up, diameter
+
+
+def _on_slit(corners, element):
+    (left, _), (_, depth), (right, _) = corners[:3]
+    near = _ON * element
+
+    def on(points):
+        x, y = points[..., 0], points[..., 1]
+        on_wall = np.minimum(np.abs(x - left), np.abs(x - right)) < near
+        inside = (x > left - near) & (x < right + near) & (y < depth + near)
+        return inside & (on_wall | (np.abs(y - depth) < near))
+
+    return on
+
+
+def _checked_slit(slit, x, y, element):
+    """Corners of a slit from the bottom edge, clockwise about its empty inside."""
+    middle, depth, width = direction("slit", slit)
+    left, right = middle - 0.5 * width, middle + 0.5 * width
+    room = min(left, x - right, y - depth, depth) - element
+    if not (width >= 0.5 * element * (1.0 - _ON) and room >= -_ON * element):
+        raise InputError(
+            f"slit must be (x, depth, width), at least an element, {element:g} m, deep, half of "
+            f"one wide, and one away from the other edges, got {shown(slit)}"
+        )
+    return [(left, 0.0), (left, depth), (right, depth), (right, 0.0)]
+
+
+def _check_apart(corners, loops, element):
+    """Raise InputError for a slit that comes nearer than an element to a hole."""
+    (left, _), (_, depth), (right, _) = corners[:3]
+    for loop in loops:
+        aside = np.maximum(np.maximum(left - loop[:, 0], loop[:, 0] - right), 0.0)
+        above = np.maximum(loop[:, 1] - depth, 0.0)
+        if (aside**2 + above**2).min() < element**2 * (1.0 - _ON):
+            raise InputError(f"slit must stay an element, {element:g} m, away from the hole")

@@ -23,7 +23,6 @@ from taichi_dem.report.forces import Forces
 from taichi_dem.report.readings import Readings, Run
 from taichi_dem.report.report import Report
 from taichi_dem.scene import Scene
-from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables, capacity_of
 from taichi_dem.state.timeline import MACRO_TICKS
@@ -91,7 +90,7 @@ class Simulation:
         started = time.perf_counter()
         compiling("set-up", 1, PARTS)
         self.scene, self.method = scene, method
-        self.model = Model(scene.mesh, scene.body_materials, scene.effects)
+        self.model = scene.model()
         name = driver_name(driver, self.model.bond_count)
         structure = Structure(scene.effects, method, scene.on_demand)
         self._engine = ENGINES.borrow(structure, capacity_of(self.model), self.model, self)
@@ -177,7 +176,7 @@ class Simulation:
         scene = self.scene if scene is None else instance("scene", scene, Scene)
         method = self.method if method is None else instance("method", method, Method)
         same = scene is self.scene
-        model = self.model if same else Model(scene.mesh, scene.body_materials, scene.effects)
+        model = self.model if same else scene.model()
         self._check_reset(scene, method, model)
         self.scene, self.method, self.model = scene, method, model
         self._load()

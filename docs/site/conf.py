@@ -40,6 +40,7 @@ CONTENTS = {
         "docs/effects_auto",
         "docs/material",
         "docs/boundaries",
+        "docs/strength_tests",
         "docs/tunnel",
         "docs/damper_engineering",
         "docs/results",

@@ -9,6 +9,7 @@ import numpy as np
 import taichi_dem as dem
 from taichi_dem.mesh.boreholes import Hole, drilled_rock, with_charges
 from taichi_dem.mesh.mesh import volumes
+from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.output.hole_monitor import Attenuation
 
 #: Rock behind the face [m], the middle of the round on it, and moduli and strengths of granite.
@@ -24,6 +25,8 @@ APART, V_APART, V_ANGLE = 0.35, 0.48, 65.0
 SLOT, EMPTY = ((MIDDLE[0] - APART - 0.5, 1.3, 2.0), (0.1, 1.4, 1.0)), 0.38
 #: Gas: peak [Pa] and rise [s]; the fall takes 2.75 times as long, as in the first paper.
 GAS = {"peak": 575e6, "rise": 1.33e-4}
+#: Pressures in the rock along the direction that is asked for on the face, and across it [Pa].
+PRESSED = 20e6, 2e6
 #: Distance from the middle of the charges at which peak velocities are given [m], and those from
 #: and up to which a power of the distance is fitted; speed from which on a piece comes out [m/s].
 PLACE, FITTED, OUT = 1.5, (0.8, 2.0), 1.0
@@ -81,8 +84,32 @@ def mesh_of(name, design, near, seed):
     return dem.read_mesh(MESHES / KEPT[name])
 
 
-def scene_of(mesh, design, exponent=0.0):
-    """The rock with gas in its charges; exponent: of gas that expands, 0 for the pressure given."""
+def stress_along(degrees):
+    """Stress of ``PRESSED`` with its largest pressure at an angle from x to y, none along z."""
+    along, across = PRESSED
+    mean, half, twice = 0.5 * (along + across), 0.5 * (along - across), np.radians(2.0 * degrees)
+    turned = half * np.cos(twice), half * np.sin(twice)
+    return -mean - turned[0], -mean + turned[0], 0.0, -turned[1], 0.0, 0.0
+
+
+def crack_direction(result):
+    """Mean direction of cracks on the face, 0 to 180 from x to y [degrees], and how alike they are.
+
+    By the area of broken faces seen along the tunnel: 0 for all directions alike, 1 for one alone.
+    """
+    broken, model = np.isfinite(result.broken_time), result.model
+    vector = area_vectors(model.mesh.points, model.topology.vertices[broken])
+    across = vector[:, 0] + 1j * vector[:, 1]
+    size = np.abs(across)
+    mean = (across**2 / np.maximum(size, 1e-300)).sum() / size.sum() if size.any() else 0.0
+    return float(np.degrees(np.angle(mean)) / 2.0 + 90.0) % 180.0, float(np.abs(mean))
+
+
+def scene_of(mesh, design, exponent=0.0, pressed_deg=None):
+    """The rock with gas in its charges.
+
+    exponent: of gas that expands, 0 for the pressure given. pressed_deg: see ``stress_along``.
+    """
     mesh, stages = with_charges(mesh, SIZE[2], design.holes)
     loads = [dem.effects.QuietBoundary(side) for side in QUIET]
     for name, hole in stages.items():
@@ -90,7 +117,9 @@ def scene_of(mesh, design, exponent=0.0):
         if exponent:
             gas = partial(dem.effects.ExpandingGas, radius=0.5 * hole.diameter_m, exponent=exponent)
         loads.insert(-len(QUIET), gas(name, start=hole.delay_s, **GAS))
-    return dem.Scene(mesh, dem.Material.from_elastic(**GRANITE), "auto", loads=loads)
+    stress = None if pressed_deg is None else stress_along(pressed_deg)
+    rock = dem.Material.from_elastic(**GRANITE)
+    return dem.Scene(mesh, rock, "auto", loads=loads, stress=stress)
 
 
 def peaks(design, result):
@@ -151,6 +180,7 @@ def measures(design, result):
         "work_kJ": 1e-3 * work,
         **{f"{part}_share": share for part, share in shares.items()},
         "residual_share": last["residual_J"] / work,
+        **dict(zip(("crack_deg", "crack_alike"), crack_direction(result))),
         **{f"radiated_{side}_J": last[f"quiet_boundary_{side}_J"] for side in QUIET},
         "cpu_s": result.report.run_cpu_seconds,
     }

@@ -231,7 +231,7 @@ def _openings(model, bonds, links):
     vector = area_vectors(model.mesh.points, model.topology.vertices[bonds])
     area = length(vector)
     normal = vector / area[:, None]
-    bonded = area / 3.0 * model.topology.bonded_share[bonds]
+    bonded = model.bonds["area"][bonds]
     out = normal[:, :, None] * normal[:, None, :]
     along, across = (model.bond_stiffness[bonds, k][:, None, None] for k in range(2))
     law = along * out + across * (np.eye(3) - out)

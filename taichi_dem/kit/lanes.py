@@ -78,6 +78,21 @@ def gathered_product(field: ti.template(), members, vectors):
 
 
 @ti.func
+def gathered_transposed_product(field: ti.template(), members, vectors):
+    """The same with the transposed matrices."""
+    made = lane_vectors(0.0)
+    for n in ti.static(range(LANES)):
+        entry = field[members[n]]
+        for r in ti.static(range(3)):
+            made[r, n] = (
+                entry[0, r] * vectors[0, n]
+                + entry[1, r] * vectors[1, n]
+                + entry[2, r] * vectors[2, n]
+            )
+    return made
+
+
+@ti.func
 def product(rows: ti.template(), place, vectors):
     """Products of a 3x3 matrix a lane with the lane's vector; rows: three fields of its rows."""
     made = lane_vectors(0.0)

@@ -40,7 +40,7 @@ class WaltonBraun(ContactLaw):
     ):
         self.restitution = between("restitution", restitution, 0.05, 1.0)
         self.stiffness = None if stiffness is None else positive("stiffness", stiffness)
-        super().__init__(geometry or BodyGeometry())
+        super().__init__(BodyGeometry() if geometry is None else geometry)
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Stiffness of loading and of unloading."""

@@ -64,21 +64,10 @@ class Gravity(Load):
 
 
 @ti.data_oriented
-class FacePressure(Load):
-    """Base of loads that push on the faces of a group along their current normal.
-
-    The area stays the mesh's.
-    """
+class FaceLoad(Load):
+    """Base of loads on the faces of a group; the area stays the mesh's."""
 
     order = 2
-
-    @abstractmethod
-    def mean_pressure(self, since, until):
-        """Mean pressure [Pa] from a time to a later one [s]."""
-
-    @abstractmethod
-    def changes(self, since, until):
-        """Nonzero where the pressure changes between two times [s]."""
 
     def declare(self, capacity: Capacity) -> None:
         """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""
@@ -100,6 +89,19 @@ class FacePressure(Load):
     def acts_on(self, i):
         """Nonzero for a body with a face in the group."""
         return self.first[i + 1] - self.first[i]
+
+
+@ti.data_oriented
+class FacePressure(FaceLoad):
+    """Base of loads that push on the faces of a group along their current normal."""
+
+    @abstractmethod
+    def mean_pressure(self, since, until):
+        """Mean pressure [Pa] from a time to a later one [s]."""
+
+    @abstractmethod
+    def changes(self, since, until):
+        """Nonzero where the pressure changes between two times [s]."""
 
     @ti.func
     def wrench(self, i, motion):

@@ -15,8 +15,9 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length, product, transposed
 from taichi_dem.kit.products import dot, matvec, squared, transposed_matvec
 from taichi_dem.kit.types import mat3, real, vec3
-from taichi_dem.kit.validation import direction, positive, shown, unit_vector, word
+from taichi_dem.kit.validation import direction, flag, positive, shown, unit_vector, word
 from taichi_dem.laws.contracts import Ground, Support, Travel
+from taichi_dem.loads.hinge import along_plane, check_alone, checked_hinge, hinge_arms, with_point
 from taichi_dem.loads.history import History, history_points, shortest_piece
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -57,6 +58,29 @@ class _Support(Support):
 
 
 @ti.data_oriented
+class _TurningSupport(_Support):
+    """A support that may hold its bodies at points alone, about which they turn."""
+
+    def __init__(self, group: str, turns: bool, about: Any):
+        super().__init__(group)
+        self.turns = flag("turns", turns)
+        self.about = checked_hinge(turns, about)
+
+    def declare(self, capacity: Capacity) -> None:
+        """Marks of the bodies, and from each centre to where it is held [m], body frame."""
+        super().declare(capacity)
+        if self.turns:
+            self.arm = ti.Vector.field(3, ti.f64, shape=capacity.bodies)
+
+    def load(self, model: Model) -> None:
+        """Mark the bodies and find where they are held; refuse bodies of other supports."""
+        super().load(model)
+        if self.turns:
+            check_alone(self, self._given, model)
+            assign(self.arm, hinge_arms(model, self.group, self.about))
+
+
+@ti.data_oriented
 class Fixed(_Support):
     """Bodies with a face in the group neither move nor turn.
 
@@ -73,7 +97,7 @@ class Fixed(_Support):
 
 
 @ti.data_oriented
-class Roller(_Support):
+class Roller(_TurningSupport):
     """Bodies with a face in the group slide on its plane and turn about its normal only.
 
     A body on several planes slides along their common directions, and turns only if all are
@@ -85,17 +109,23 @@ class Roller(_Support):
         Face group.
     normal : sequence of float
         Normal of the plane [-]; its length does not matter.
+    turns : bool, default False
+        Whether bodies turn freely, as on a knife edge: only a point of each keeps to the plane.
+    about : sequence, optional
+        With turns: a point, or two points of a line [m], where the bodies are held, each at the
+        nearest point of the line. None: the middle line of the group, the middle of a group less
+        than twice as long as wide.
     """
 
-    def __init__(self, group: str, normal: Sequence[float]):
-        super().__init__(group)
+    def __init__(self, group: str, normal: Sequence[float], turns: bool = False, about: Any = None):
+        super().__init__(group, turns, about)
         self._normal = unit_vector("normal", normal)
 
     def declare(self, capacity: Capacity) -> None:
         """Direction that each body may not move in, and whether it may turn about the normal."""
         super().declare(capacity)
         self.across = ti.Vector.field(3, ti.f64, shape=capacity.bodies)
-        self.turns = ti.field(ti.i32, shape=capacity.bodies)
+        self.swivels = ti.field(ti.i32, shape=capacity.bodies)
 
     def load(self, model: Model) -> None:
         """Share the directions that a body may not move in among the rollers that hold it."""
@@ -115,23 +145,30 @@ class Roller(_Support):
             shares[plane] = np.divide(rest, size, out=0.0 * rest, where=size > _PARALLEL)
         planes = sum(share.any(axis=1).astype(np.int32) for share in shares.values())
         assign(self.across, shares[_upward(self._normal)])
-        assign(self.turns, (planes == 1).astype(np.int32))
+        assign(self.swivels, (planes == 1).astype(np.int32))
 
     @ti.func
     def held(self, i, t, step, rotation, velocity, angular_momentum):
-        """Velocity within the plane, spin about its normal."""
+        """Velocity within the plane, spin about its normal; turning, a point within the plane."""
         normal = self.across[i]
         kept = vec3(0.0)
-        if self.turns[i] == 1:
-            kept = angular_momentum
-            if squared(normal) > 0.0:
-                axis = transposed_matvec(rotation, normal)
-                # The moment of the plane is normal to its normal: the component along it stays.
-                spin = dot(angular_momentum, normal) / dot(
-                    axis, matvec(self.tables.inertia[i], axis)
-                )
-                kept = matvec(rotation, matvec(self.tables.inertia[i], spin * axis))
-        return velocity - dot(velocity, normal) * normal, kept
+        if ti.static(self.turns):
+            arm = matvec(rotation, self.arm[i])
+            velocity, kept = along_plane(
+                self.tables, i, rotation, arm, normal, velocity, angular_momentum
+            )
+        else:
+            if self.swivels[i] == 1:
+                kept = angular_momentum
+                if squared(normal) > 0.0:
+                    axis = transposed_matvec(rotation, normal)
+                    # The moment of the plane is normal to its normal: the component along it stays.
+                    spin = dot(angular_momentum, normal) / dot(
+                        axis, matvec(self.tables.inertia[i], axis)
+                    )
+                    kept = matvec(rotation, matvec(self.tables.inertia[i], spin * axis))
+            velocity -= dot(velocity, normal) * normal
+        return velocity, kept
 
 
 def _upward(normal):
@@ -140,7 +177,7 @@ def _upward(normal):
 
 
 @ti.data_oriented
-class PrescribedMotion(_Support):
+class PrescribedMotion(_TurningSupport):
     """Bodies with a face in the group move with a given velocity and do not turn.
 
     Parameters
@@ -156,6 +193,10 @@ class PrescribedMotion(_Support):
     history : tuple of (sequence, sequence), optional
         (times [s], shares), in place of a ramp: the velocity is multiplied by the shares, linear
         between the times and constant before the first and after the last.
+    turns : bool, default False
+        Whether bodies turn freely: only a point of each has the velocity.
+    about : sequence, optional
+        With turns: where, as of a ``Roller``.
     """
 
     def __init__(
@@ -165,8 +206,10 @@ class PrescribedMotion(_Support):
         frequency: float = 0.0,
         ramp: float = 0.0,
         history: Any = None,
+        turns: bool = False,
+        about: Any = None,
     ):
-        super().__init__(group)
+        super().__init__(group, turns, about)
         self._velocity = direction("velocity", velocity)
         self._frequency = positive("frequency", frequency, zero_allowed=True)
         self._ramp = positive("ramp", ramp, zero_allowed=True)
@@ -219,10 +262,17 @@ class PrescribedMotion(_Support):
 
     @ti.func
     def held(self, i, t, step, rotation, velocity, angular_momentum):
-        """The prescribed velocity, its shares as a mean over the step, and no spin."""
+        """The prescribed velocity, its shares as a mean over the step; no spin unless it turns."""
         amplitude = vec3(self.law[0], self.law[1], self.law[2])
         _, swing = sine_and_cosine(self.law[3] * t)
-        return amplitude * swing * self.shares.mean(t - 0.5 * step, t + 0.5 * step), vec3(0.0)
+        wanted = amplitude * swing * self.shares.mean(t - 0.5 * step, t + 0.5 * step)
+        momentum = vec3(0.0)
+        if ti.static(self.turns):
+            arm = matvec(rotation, self.arm[i])
+            wanted, momentum = with_point(
+                self.tables, i, rotation, arm, wanted, velocity, angular_momentum
+            )
+        return wanted, momentum
 
 
 def _shares(ramp, history):

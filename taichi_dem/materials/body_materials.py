@@ -47,7 +47,9 @@ def joined(first: Material, second: Material) -> Material:
     least = {name: min(getattr(first, name), getattr(second, name)) for name in _LEAST}
     series = {name: joined_constants(getattr(first, name), getattr(second, name)) for name in RULES}
     density = 0.5 * (first.density + second.density)
-    return unchecked(first, density=density, **least, **series)
+    wider = max(first, second, key=lambda one: (one.strength_spread, one.strength_volume))
+    spread = {name: getattr(wider, name) for name in ("strength_spread", "strength_volume")}
+    return unchecked(first, density=density, **least, **series, **spread)
 
 
 def _of_bonds(name) -> Any:

@@ -36,6 +36,7 @@ from taichi_dem.materials.bond_rules import (
     Rule,
     ShareOfCritical,
 )
+from taichi_dem.materials.strength import MOST_SPREAD
 
 #: E_t / E_n, then 3 K / E_n and G over that of uniform tractions: means over five periodic Delaunay
 #: meshes of 990 to 1900 tetrahedra about points that repel each other, which differ among each
@@ -63,7 +64,10 @@ POISSON = -0.2, 0.45
 #: Fields whose number tells by its size when another unit is meant.
 _QUANTITIES = {"density": DENSITY, "tensile_strength": STRENGTH, "cohesion": STRENGTH}
 _MAY_BE_ZERO = frozenset(
-    {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}
+    {
+        *("normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"),
+        *("strength_spread", "strength_volume"),
+    }
 )
 #: Kind of rule that may stand for a number, by field; what joins two materials is in series there.
 RULES: dict[str, type] = {
@@ -149,6 +153,13 @@ class Material:
         Stiffness of one contact of spheres [N/m], for ``SphereContact`` alone.
     contact_damping : float or rule
         Dashpot of one contact of spheres [N s/m], likewise.
+    strength_spread : float, default 0.0
+        Relative standard deviation of the strength from bond to bond, at most 1: by Weibull's law,
+        drawn by the seed of the scene. Tensile strength, cohesion and fracture energies of a bond
+        vary together, so that its opening at failure stays; those given are the means.
+    strength_volume : float, default 0.0
+        Volume [m^3] of rock that has this strength in the mean; larger bonds are weaker, smaller
+        ones stronger, by the Weibull modulus. 0: all sizes alike.
     coarse : {"refuse", "weaken"}, default "refuse"
         What a scene does where elements are too large for strength and energy, see
         ``from_elastic``.
@@ -171,6 +182,8 @@ class Material:
     fracture_energy: float
     contact_stiffness: Constant
     contact_damping: Constant
+    strength_spread: float = 0.0
+    strength_volume: float = 0.0
     coarse: str = REFUSE
 
     def __post_init__(self):
@@ -183,6 +196,7 @@ class Material:
                 positive(field.name, value, zero_allowed=field.name in _MAY_BE_ZERO)
             if field.name in _QUANTITIES:
                 in_unit(field.name, value, _QUANTITIES[field.name])
+        between("strength_spread", self.strength_spread, 0.0, MOST_SPREAD)
         if not isinstance(self.normal_stiffness, BondRule):
             check_energy(self)
 
@@ -198,6 +212,8 @@ class Material:
         friction_angle: float,
         cohesion: float,
         damping_ratio: float = 0.05,
+        strength_spread: float = 0.0,
+        strength_volume: float = 0.0,
         coarse: str = REFUSE,
     ) -> Material:
         """Make a material from measured values; shorter bonds are stiffer.
@@ -226,6 +242,10 @@ class Material:
         damping_ratio : float, default 0.05
             Share of the critical damping of a bond between its two bodies, and of contacts; 0 for
             none.
+        strength_spread : float, default 0.0
+            Relative standard deviation of the strength from bond to bond, see ``Material``.
+        strength_volume : float, default 0.0
+            Volume of rock that has this strength in the mean [m^3], likewise.
         coarse : {"refuse", "weaken"}, default "refuse"
             What a scene does with elements so large that a bond at its tensile strength holds more
             than the fracture energy: refuse them, with the size that would do, or lower the
@@ -267,6 +287,8 @@ class Material:
             fracture_energy=fracture_energy,
             contact_stiffness=FaceStiffness(normal),
             contact_damping=ContactShareOfCritical(ratio, normal) if ratio else 0.0,
+            strength_spread=strength_spread,
+            strength_volume=strength_volume,
             coarse=coarse,
         )
 

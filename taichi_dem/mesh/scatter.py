@@ -11,7 +11,7 @@ import numpy as np
 from taichi_dem.kit.errors import InputError
 from taichi_dem.mesh import tetrahedra as geometry
 
-#: Given points (n, 3) [m], whether each lies in the solid.
+#: Given points (n, 3) [m], whether each lies in the solid, or on one of its sides.
 Within = Callable[[np.ndarray], np.ndarray]
 #: Largest move of a point along each axis, at the start and where a body is bad; least distance of
 #: a moved point from the planes around it: all in elements. Of moves of 0.45 rows are left.
@@ -33,17 +33,20 @@ _FLAT, _MISSING = 1e-9, 1e-11
 class _Solid:
     """What stays while points move: the region, and the axes along which each may move."""
 
-    def __init__(self, points, tetrahedra, within, element):
-        self.within, self.element = within, element
+    def __init__(self, points, tetrahedra, within, on_side, element):
+        self.within, self.on_side, self.element = within, on_side, element
         self.volume = np.abs(geometry.signed_volumes(points, tetrahedra)).sum()
         self.free = _free_axes(points, tetrahedra)
         margin = _FROM_SIDE * element * self.free
+        # Points of one side, as between the corners of a slit and the ends of the solid.
+        self.sliding = self.free[:, :2].sum(axis=1) == 1
         self.low, self.high = points.min(axis=0) + margin, points.max(axis=0) - margin
 
     def moved(self, points, shift):
         """Points shifted along their free axes, where that leaves them in the solid."""
         found = np.clip(points + self.free * shift, self.low, self.high)
         out = ~self.within(found) & self.free[:, :2].all(axis=1)
+        out[self.sliding] = ~self.on_side(found[self.sliding])
         found[out] = points[out]
         return found
 
@@ -65,10 +68,15 @@ class _Solid:
 
 
 def scattered(
-    points: np.ndarray, tetrahedra: np.ndarray, within: Within, element: float, seed: int
+    points: np.ndarray,
+    tetrahedra: np.ndarray,
+    within: Within,
+    on_side: Within,
+    element: float,
+    seed: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) [m] and tetrahedra (m, 4) of the same solid and element size, without rows."""
-    solid = _Solid(points, tetrahedra, within, element)
+    solid = _Solid(points, tetrahedra, within, on_side, element)
     if not solid.free.any():
         return points, tetrahedra
     draw = np.random.default_rng(seed)

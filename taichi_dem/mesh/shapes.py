@@ -30,6 +30,8 @@ OnOutline = Callable[[np.ndarray], np.ndarray]
 #: Least distance of an inner point from the outline, and shift that decides between triangulations
 #: of points on one circle, in elements.
 _FROM_OUTLINE, _SHIFT = 0.55, 1e-4
+#: Distance from the outline within which a point lies on it, in elements.
+_ON = 1e-6
 #: Largest circumscribed radius of an inner triangle, in elements, and where that fails.
 _RADII = 0.95, 1.6
 #: Rounds of smoothing, and moves of a round.
@@ -168,8 +170,12 @@ def drawn_out(
     tetrahedra = np.vstack(layered)
     if scatter is not None:
         outline = _outline(loops)
-        arrays = points, tetrahedra, lambda x: _is_inside(x[:, :2], *outline)
-        points, tetrahedra = scattered(*arrays, element, scatter)
+        near = _ON * element
+        tests = (
+            lambda x: _is_inside(x[:, :2], *outline),
+            lambda x: _distance(x[:, :2], *outline) < near,
+        )
+        points, tetrahedra = scattered(points, tetrahedra, *tests, element, scatter)
     groups = _groups(points, geometry.outer_faces(tetrahedra), depth, sides)
     made = checked_mesh(points, tetrahedra, groups)
     return made if scatter is None else in_space_order(made)

@@ -52,6 +52,16 @@ def mobility(mass_inverse_i, turn_i, mass_inverse_j, turn_j, branch):
 
 
 @ti.func
+def coupled_mobility(coupling_i, coupling_j, branch):
+    """What ``mobility`` has beside that of two bodies of which an impulse turns the one it moves.
+
+    coupling: velocity of a body per moment on it, and transposed its spin per impulse [1/(kg m)].
+    """
+    lever = matmul(coupling_i, cross_matrix(branch))
+    return Block(a=lever + lever.transpose(), b=coupling_i + coupling_j, c=mat3(0.0))
+
+
+@ti.func
 def plus(one, other):
     """Sum of two blocks."""
     return Block(a=one.a + other.a, b=one.b + other.b, c=one.c + other.c)

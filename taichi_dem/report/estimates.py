@@ -152,7 +152,7 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
     """
     instance("scene", scene, Scene)
     until, part = positive("until", until), parts_of(scene.mesh)
-    model = Model(scene.mesh, scene.body_materials, scene.effects)
+    model = scene.model()
     velocity, meet = scene.initial_motion.get("velocity"), may_meet(scene, part)
     scales = PartScales(model, part)
     beside, rim, fastest = _speeds(model, velocity, part)

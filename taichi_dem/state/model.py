@@ -52,10 +52,20 @@ class Model:
 
     material: the first of the bodies' materials, with the numbers that its contacts have in the
     mesh. body_mass [kg], centre [m], body_inertia [kg m^2], body_radius [m] of the ball around a
-    body.
+    body. stress: at the start, a matrix (3, 3) [Pa], or None. strength: of each bond over the
+    material's, (bond_count,), or None for one of all: a law sees it as a share of the area that
+    bears the whole stiffness, so that strengths and energies have the factor and openings none.
     """
 
-    def __init__(self, mesh: Mesh, material: AnyMaterial, effects: Iterable[Any]):
+    def __init__(
+        self,
+        mesh: Mesh,
+        material: AnyMaterial,
+        effects: Iterable[Any],
+        stress: np.ndarray | None = None,
+        strength: np.ndarray | None = None,
+    ):
+        self.stress, self.strength = stress, strength
         if not isinstance(material, BodyMaterials):
             material = body_materials(mesh, material)
         self.mesh, self.materials = mesh, material
@@ -147,17 +157,18 @@ class Model:
         normal = area / size[:, None]
         frame = np.stack([normal, xi, np.cross(normal, xi)], axis=1)
         from_master = corners - self.centre[top.master][:, None]
+        unit_area = size / 3.0 * top.bonded_share
         return {
             "slots": slots.astype(np.int32),
             "frame": frame,
-            "area": size / 3.0 * top.bonded_share,
+            "area": unit_area if self.strength is None else unit_area * self.strength,
             "on_master": product(from_master, transposed(frame)),
             "on_slave": corners - self.centre[top.slave][:, None],
         }
 
     @property
     def bond_stiffness(self) -> np.ndarray:
-        """Normal and shear stiffness of every bond per area [Pa/m], (bond_count, 2)."""
+        """Normal and shear stiffness of every bond per bearing area [Pa/m], (bond_count, 2)."""
         return self._per_bond(springs_of(self.materials))
 
     @property
@@ -165,8 +176,25 @@ class Model:
         """Normal and shear dashpot of every bond per area [Pa s/m], (bond_count, 2)."""
         return self._per_bond(dashpots_of(self.materials))
 
+    @property
+    def start_tractions(self) -> np.ndarray:
+        """Tractions of the stress at the start in the face frame [Pa], (bond_count, 3).
+
+        Those of the bonded area, which bears the whole face.
+        """
+        frame, top = self.bonds["frame"], self.topology
+        pull = product(frame, (frame[:, 0] @ self.stress)[:, :, None])[:, :, 0]
+        share = top.bonded_share if self.strength is None else top.bonded_share * self.strength
+        return pull / share[:, None]
+
+    @property
+    def start_openings(self) -> np.ndarray:
+        """Openings of all bonds that make these tractions [m], (bond_count, 3)."""
+        return self.start_tractions / self.bond_stiffness[:, [0, 1, 1]]
+
     def _per_bond(self, constants):
-        return per_bond(self.mesh, self.topology, self.materials.density, constants)
+        found = per_bond(self.mesh, self.topology, self.materials.density, constants)
+        return found if self.strength is None else found / self.strength[:, None]
 
 
 def sums(group: np.ndarray, of_members: np.ndarray, count: int = 0) -> np.ndarray:

@@ -201,7 +201,11 @@ class Tables:
         assign(self.bond_frame, bonds["frame"])
         assign(self.bond_stiffness, model.bond_stiffness)
         assign(self.unit_area, bonds["area"])
-        assign(self.vertex_master, bonds["on_master"].reshape(-1, 3))
+        on_master = bonds["on_master"]
+        if model.stress is not None:
+            # Bodies that have not moved are then apart by what makes the stress at the start.
+            on_master = on_master - model.start_openings[:, None]
+        assign(self.vertex_master, on_master.reshape(-1, 3))
         assign(self.vertex_slave, bonds["on_slave"].reshape(-1, 3))
 
     def _load_spheres(self, spheres):

@@ -161,11 +161,13 @@ class SolvedStep(Step):
         for k in ti.static(range(3)):
             axis = unit[:, k]
             velocity, _ = self._allowed_in_step(i, self.tables.mass_inverse[i] * axis, 0.0 * axis)
-            _, momentum = self._allowed_in_step(i, 0.0 * axis, axis)
+            moved, momentum = self._allowed_in_step(i, 0.0 * axis, axis)
             spin = matvec(turn, momentum - rest_turn)
             for r in ti.static(range(3)):
                 velocities.hold[i][r, k] = velocity[r] - rest[r]
                 velocities.turn[i][r, k] = spin[r]
+                if ti.static(velocities.couples):
+                    velocities.coupling[i][r, k] = moved[r] - rest[r]
 
     @ti.func
     def _allowed_in_step(self, i, velocity, momentum):

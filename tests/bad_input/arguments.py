@@ -140,6 +140,7 @@ VALUES = {
     },
     **{"material": td.CONCRETE, "mesh": PAIR, "method": METHOD, "normal": (1.0, 0.0, 0.0)},
     **{"points": PAIR.points, "ratios": [0.9, 1.0], "s": 0, "scene": ALONE, "time_s": 0.01},
+    **{"stress": (-1e5, 0.0, 0.0, 0.0, 0.0, 0.0)},
     **{"structure": STRUCTURE, "term": "kinetic", "tetrahedra": PAIR.tetrahedra, "until": 3e-7},
     **{"times": [0.0, 1e-4], "values": [0.0, 1e6], "velocity": (1.0, 0.0, 0.0)},
     **{"when": td.Every(steps=2), **TABLE},

@@ -38,9 +38,9 @@ KINDS = {
     "index": "bodies frame number",
     "whole": "particles seed",
     "any": """about acceleration axis base bend box by displacement factor force history hole notch
-        normal phase phases points shapes start_velocity t time_s times times_s turned u v values
-        value velocity x y spin sizes motion tetrahedra goal boxes filling excitation observers
-        amplitude amplitudes effects.Pressure.peak report.measures.Cycles.base_amplitude
+        normal phase phases points shapes start_velocity stress t time_s times times_s turned u v
+        values value velocity x y spin sizes motion tetrahedra goal boxes filling excitation
+        observers amplitude amplitudes effects.Pressure.peak report.measures.Cycles.base_amplitude
         report.measures.Cycles.stiffness report.measures.Cycles.damping
         report.measures.Cycles.mass Oscillator.added_mass Oscillator.frequency
         Oscillator.gravity ModalStructure.frequency""",

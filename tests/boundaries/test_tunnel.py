@@ -6,12 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cases.tunnel import KEPT, SIZE, designs, mesh_of, scene_of
+from cases.tunnel import (
+    KEPT,
+    PRESSED,
+    SIZE,
+    crack_direction,
+    designs,
+    mesh_of,
+    scene_of,
+    stress_along,
+)
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.mesh.boreholes import Hole, check_holes, drilled_rock, read_holes, with_charges
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.mesh.tetrahedra import area_vectors
+from tests.made_result import made_result
 
 
 def kept_mesh(name):
@@ -142,3 +152,21 @@ def test_a_round_has_gas_by_delay_and_diameter_and_fits_an_engine():
     assert [(one.start, one.radius) for one in gas] == wanted
     assert len(scene.loads) == 9
     Simulation(scene, Uniform(1e-7))
+
+
+def test_the_direction_of_cracks_and_of_the_largest_pressure():
+    """Faces across x are cracks along y. Pressure along n: n s n = -20 MPa, across it -2 MPa."""
+    mesh = bar(0.4, 0.4, (2, 2, 2))
+    whole = made_result(mesh=mesh, frames=1)
+    normal = whole.model.bonds["frame"][:, 0]
+    for axis, degrees in ((0, 90.0), (1, 0.0)):
+        along = np.abs(normal[:, axis]) > 0.99
+        one = replace(whole, broken_time=np.where(along, 0.0, np.nan))
+        assert crack_direction(one) == pytest.approx((degrees, 1.0), abs=1e-12)
+    nothing = np.full(len(normal), np.nan)
+    assert crack_direction(replace(whole, broken_time=nothing))[1] == 0.0
+    xx, yy, zz, xy, yz, zx = stress_along(30.0)
+    way = np.array([np.cos(np.pi / 6.0), 0.5])
+    turned = np.array([[xx, xy], [xy, yy]])
+    assert -(turned @ way) == pytest.approx(PRESSED[0] * way, rel=1e-12)
+    assert turned.trace() == pytest.approx(-sum(PRESSED), rel=1e-12) and zz == yz == zx == 0.0

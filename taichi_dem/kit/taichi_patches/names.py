@@ -40,7 +40,7 @@ def check_needed() -> None:
     lacking = [path for path in paths if named(path) is None]
     if not lacking:
         runtime = named("taichi.lang.impl.get_runtime")()
-        lacking = [name for name in _OF_RUNTIME if not hasattr(runtime, name)]
+        lacking = [name for name in _OF_RUNTIME if name not in dir(runtime)]
     if lacking:
         raise ImportError(f"{_wanted()} without {lacking[0]}, which is needed")
 

@@ -246,6 +246,8 @@ class PairDashpots(ContactForces):
         along = dot(normal, matvec(slack, normal))
         turn_i, turn_j = self.velocities.turn[i], self.velocities.turn[j]
         along += dot(first, matvec(turn_i, first)) + dot(second, matvec(turn_j, second))
+        if ti.static(self.velocities.couples):
+            along += self._coupled(i, j, normal, first, second)
         first_along, second_along = first, second
         across = slack.trace()
         for c in ti.static(range(3)):
@@ -253,12 +255,23 @@ class PairDashpots(ContactForces):
             first, second = cross(other, axis), cross(arm, axis)
             across += dot(first, matvec(turn_i, first))
             across += dot(second, matvec(turn_j, second))
+            if ti.static(self.velocities.couples):
+                across += self._coupled(i, j, axis, first, second)
         across -= along
         if ti.static(self.turns):
             first, second = first_along + met.couple, second_along + met.couple
             along = dot(normal, matvec(slack, normal))
             along += dot(first, matvec(turn_i, first)) + dot(second, matvec(turn_j, second))
+            if ti.static(self.velocities.couples):
+                along += self._coupled(i, j, normal, first, second)
         return along, across
+
+    @ti.func
+    def _coupled(self, i, j, axis, first, second):
+        """What bodies that turn where they are pushed add to the velocity per impulse [1/kg]."""
+        turned = matvec(self.velocities.coupling[i], first)
+        turned += matvec(self.velocities.coupling[j], second)
+        return 2.0 * dot(axis, turned)
 
     @ti.func
     def visit(self, a):

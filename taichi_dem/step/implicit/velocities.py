@@ -3,12 +3,20 @@
 import taichi as ti
 
 from taichi_dem.kit.allocation import raise_to
-from taichi_dem.kit.lanes import LANES, gathered, gathered_numbers, gathered_product, row_of, scaled
-from taichi_dem.kit.products import cross, matvec, squared, stacked
+from taichi_dem.kit.lanes import (
+    LANES,
+    gathered,
+    gathered_numbers,
+    gathered_product,
+    gathered_transposed_product,
+    row_of,
+    scaled,
+)
+from taichi_dem.kit.products import cross, matvec, squared, stacked, transposed_matvec
 from taichi_dem.kit.types import real
 from taichi_dem.physics.ground import braked_twist, twist_of
 from taichi_dem.physics.rotation import unit3, world_tensor
-from taichi_dem.physics.wrench import mobility
+from taichi_dem.physics.wrench import coupled_mobility, mobility, plus
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.multirate.schedule import Schedule
 
@@ -30,6 +38,10 @@ class Velocities:
         if self.has_supports:
             self.hold = ti.Matrix.field(3, 3, real, shape=n)
             self.given = ti.Vector.field(6, real, shape=n)
+        # A body that is held at a point turns where it is pushed.
+        self.couples = any(getattr(effect, "turns", False) for effect in tables.supports)
+        if self.couples:
+            self.coupling = ti.Matrix.field(3, 3, real, shape=n)
 
     @ti.func
     def slack(self, i):
@@ -42,7 +54,19 @@ class Velocities:
     @ti.func
     def mobility(self, i, j, branch):
         """Twist of body j against i per wrench between them at j's centre, a ``Block``."""
-        return mobility(self.slack(i), self.turn[i], self.slack(j), self.turn[j], branch)
+        found = mobility(self.slack(i), self.turn[i], self.slack(j), self.turn[j], branch)
+        if ti.static(self.couples):
+            more = coupled_mobility(self.coupling[i], self.coupling[j], branch)
+            found = plus(found, more)
+        return found
+
+    @ti.func
+    def coupled(self, i, velocity, spin, force, moment):
+        """Velocity and spin that body i gains of an impulse and a moment, with its coupling."""
+        if ti.static(self.couples):
+            velocity += matvec(self.coupling[i], moment)
+            spin += transposed_matvec(self.coupling[i], force)
+        return velocity, spin
 
     @ti.func
     def apart(self, i, j, branch):
@@ -54,13 +78,15 @@ class Velocities:
     @ti.func
     def pull(self, i, j, branch, force, moment):
         """Apply an impulse and a moment at j's centre to body i, and the opposite to j."""
-        turned = matvec(self.turn[i], moment + cross(branch, force))
-        back = matvec(self.turn[j], moment)
+        around = moment + cross(branch, force)
+        turned, back = matvec(self.turn[i], around), matvec(self.turn[j], moment)
         first, second = self.lightness[i] * force, self.lightness[j] * force
         if ti.static(self.has_supports):
             first, second = matvec(self.hold[i], force), matvec(self.hold[j], force)
-            self.given[i] = self.given[i] + stacked(force, moment + cross(branch, force))
+            self.given[i] = self.given[i] + stacked(force, around)
             self.given[j] = self.given[j] + stacked(-force, -moment)
+        first, turned = self.coupled(i, first, turned, force, around)
+        second, back = self.coupled(j, second, back, force, moment)
         self.twist[i] = self.twist[i] + stacked(first, turned)
         self.twist[j] = self.twist[j] - stacked(second, back)
 
@@ -77,6 +103,9 @@ class Velocities:
         else:
             linear += scaled(gathered_numbers(self.lightness, i), force)
         angular += gathered_product(self.turn, i, moment)
+        if ti.static(self.couples):
+            linear += gathered_product(self.coupling, i, moment)
+            angular += gathered_transposed_product(self.coupling, i, force)
         return linear, angular
 
     @ti.func
@@ -94,6 +123,7 @@ class Velocities:
         velocity, spin = matvec(self.slack(i), force), matvec(self.turn[i], moment)
         if ti.static(self.has_supports):
             self.given[i] = self.given[i] + stacked(force, moment)
+        velocity, spin = self.coupled(i, velocity, spin, force, moment)
         self.twist[i] = self.twist[i] + stacked(velocity, spin)
 
 
