@@ -465,7 +465,7 @@ class Batch(LoadedScenes):
     @property
     def certificate(self) -> Certificate:
         """Effects that acted and since when, size of those left out."""
-        return certificate_of(self)
+        return certificate_of(self, self._momentum_error())
 
     def _go(
         self,

@@ -235,7 +235,7 @@ class Automaton:
 
     def checked_range(self, driven: Driven) -> CheckedRange:
         """Range in which the rules were checked, and what of the scenes lies outside it."""
-        return self.rules.known_range(self, driven)
+        return self.rules.range_of(self, driven)
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """Meaning of the code of ``divergence_code``, and a step that avoids it [s]."""

@@ -15,6 +15,8 @@ from taichi_dem.kit.effect_table import BaseCertificate, Estimate
 EFFECTS = ("listed", "auto")
 #: Difference of cycles up to which they are alike, as a share of the first harmonic.
 ALIKE = 1e-3
+#: Share of the momentum exchanged that may be missing; rounding makes less than 1e-9.
+CLOSED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -157,11 +159,14 @@ def checked_range(batch: Any) -> CheckedRange | None:
     return CheckedRange(found[0].words, outside, warning, bool((size > 0.0).all()))
 
 
-def certificate_of(batch: Any) -> Certificate:
+def certificate_of(batch: Any, momentum_error: float) -> Certificate:
     """Certificate of a batch since its start: the table of its effects."""
     checked, diverged = checked_range(batch), len(batch.divergences())
     outside = () if checked is None else checked.outside
-    gone = (f"{counted(diverged, 'scene')} diverged",) if diverged else ()
+    gone = [f"{counted(diverged, 'scene')} diverged"] if diverged else []
+    # A filling without an order leaves impulses out, and says so.
+    if getattr(batch.fillings.kinds[0], "order", None) is not None and momentum_error > CLOSED:
+        gone.append(f"momentum closes only to {100.0 * momentum_error:.2g} %: a blow is not booked")
     return Certificate(
         effects=batch.asked_effects,
         acting=tuple(_uses(batch)),

@@ -45,3 +45,9 @@ class Rules(ABC):
     @abstractmethod
     def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
         """The range in which the rules were checked, and what of the scenes lies outside it."""
+
+    def range_of(self, automaton: Any, driven: Driven) -> CheckedRange:
+        """Their own ``known_range``; a class that takes another's was compared with nothing."""
+        if "known_range" in vars(type(self)):
+            return self.known_range(automaton, driven)
+        return CheckedRange("none is known", (f"rules {type(self).__name__}",))
