@@ -148,6 +148,13 @@ def test_a_slit_takes_its_box_out_of_a_plate_and_of_a_beam(scatter):
         assert np.linalg.norm(np.diff(edges, axis=2), axis=-1).min() > 0.2 * width
 
 
+def test_points_of_the_bottom_do_not_slide_into_a_slit():
+    """This seed moves one there; no body would then lie at it."""
+    slit = {"slit": (0.1, 0.05, 0.01), "element": 0.01, "scatter": 6}
+    mesh = shapes.plate(width=0.2, height=0.1, thickness=0.02, **slit)
+    assert volumes(mesh).sum() == pytest.approx((0.02 - 0.0005) * 0.02, rel=1e-12)
+
+
 def test_what_cannot_be_a_slit_or_a_hinge_is_refused():
     plate = partial(shapes.plate, width=0.2, height=0.1, thickness=0.02, element=0.02)
     for slit in ((0.1, 0.05, 0.005), (0.01, 0.05, 0.01), (0.1, 0.09, 0.01), 0.1):
