@@ -81,6 +81,7 @@ class Run:
             "searches": self.simulation.searches,
             "needs": missing.findings(missing.volume),
             "frames": len(self.recorder.frames),
+            "near": self.simulation.contacts.store.near_table()[0].tolist(),
         }
         arrays = {
             **self.saved.memory().read(),

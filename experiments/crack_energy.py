@@ -1,0 +1,150 @@
+"""What does a crack cost on a scattered mesh, by the law of its bonds and the size of elements?
+
+A notched plate is pulled apart slowly, with the paper's laws of bonds and with ``CohesiveCrack``.
+The characteristic length E G / f_t^2 is a fifth of the way that the crack runs. A plane crack would
+spend G times the area of that plane. The slower the load, the less is spent beside the crack.
+
+    python experiments/crack_energy.py --speed 0.005
+
+Writes energy.png, cracks.csv and summary.json to results/crack_energy/.
+"""
+
+import sys
+import warnings
+from functools import partial
+from itertools import product
+from types import SimpleNamespace
+
+import numpy as np
+
+from cases.trust.plates import material_of, plate, springs_step
+from taichi_dem import ImplicitDashpots, Scene, Simulation, effects
+from taichi_dem.kit import study
+from taichi_dem.kit.plot_style import BLUE, GREEN, RED, picture
+from taichi_dem.kit.progress_bar import ProgressBar
+from taichi_dem.mesh.mesh import with_cut
+from taichi_dem.output.fracture import crack_areas
+
+NAME = "crack_energy"
+SETTINGS = {
+    "meshes": (2, 1, study.whole(1, 20), "random meshes of each size, default 2"),
+    "sizes": (2, 1, study.whole(1, 3), "sizes of elements, coarse first, default 2"),
+    "speed": (0.02, 0.02, study.number(1e-3, 1.0), "of both ends [m/s], default 0.02"),
+}
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
+#: Length and width of the plate, and depth of the notch [m]; elements in a characteristic length.
+LENGTH, WIDTH, DEPTH, ELEMENTS = 0.05, 0.05, 0.015, (2.0, 2.8, 4.0)
+#: E [Pa] and strength of bonds [Pa]; cohesion over strength; characteristic length over the way.
+YOUNG, STRENGTH, COHESION, SHARE = 32e9, 3e6, 3.0, 0.2
+CRACK_LENGTH = SHARE * (WIDTH - DEPTH)
+ENERGY = CRACK_LENGTH * STRENGTH**2 / YOUNG
+#: Time in which the ends take up their speed, between looks [s], and way after which runs end [m].
+RAMP, LOOK, FAR = 5e-5, 1e-5, 6e-6
+LAWS = {
+    "paper": lambda: [effects.Softening(), effects.ShearSlip()],
+    "cohesive crack": lambda: [effects.CohesiveCrack()],
+}
+#: What counts as agreement of the energy.
+LOW, HIGH = 0.95, 1.08
+TABLE = study.Table(
+    law=("law", "law"),
+    elements=("elements", "elements in a length", ".1f", "1"),
+    seed=("seed", "mesh", "d", "1"),
+    bodies=("bodies", "bodies", "d", "1"),
+    energy=("energy", "energy / (G plane)", ".3f", "1"),
+    beside=("beside", "share beside", ".3f", "1"),
+    area=("area", "broken area / plane", ".3f", "1"),
+    open=("open", "left open", ".1e", "1"),
+)
+
+
+def parted(law, elements, seed, speed):
+    """Pull a plate on a random mesh apart. Subject of TABLE."""
+    edge = CRACK_LENGTH / elements
+    whole = plate(LENGTH, WIDTH, edge, seed, in_rows=False)
+    middle = (0.5 * LENGTH, 0.0, 0.0)
+    mesh = with_cut(whole, "notch", middle, (1, 0, 0), lambda x: x[:, 1] < DEPTH)
+    options = {"tensile_strength": STRENGTH, "fracture_energy": ENERGY, "density": 2450.0}
+    more = {"friction_angle": 30.0, "cohesion": COHESION * STRENGTH, "damping_ratio": 0.1}
+    material = material_of(mesh, YOUNG, 0.2, **options, **more)
+    drives = [
+        effects.PrescribedMotion(group, (way * speed, 0, 0), ramp=RAMP)
+        for group, way in (("left", -1), ("right", 1))
+    ]
+    laws = [*LAWS[law](), effects.BondDamping()]
+    scene = Scene(mesh, material, [*laws, *drives], unbonded=["notch"])
+    simulation = Simulation(scene, ImplicitDashpots(springs_step(scene)))
+    run_apart(simulation, FAR / speed)
+    made = {"law": law, "elements": elements, "seed": seed, "bodies": mesh.body_count}
+    return SimpleNamespace(**made, **spent(simulation, edge))
+
+
+def run_apart(simulation, end):
+    """Advance until both ends of the plate are in different pieces, or to an end [s]."""
+    x, step = simulation.model.centre[:, 0], simulation.method.dt0
+    for look in range(1, round(end / LOOK) + 1):
+        simulation.advance_to(round(look * LOOK / step))
+        piece = simulation.model.pieces(simulation.state.broken())
+        if piece[x.argmin()] != piece[x.argmax()]:
+            break
+
+
+def spent(simulation, edge):
+    """Energy and area of the crack by those of its plane, and the share spent beside it."""
+    broken, plane = simulation.state.broken(), (WIDTH - DEPTH) * edge
+    # Slip, release and softening of each bond.
+    taken = simulation.readings.bonds()[:, 2:].sum(axis=1)
+    area = crack_areas(simulation.model)[broken].sum()
+    residual = simulation.energy_balance.account()["residual"]
+    return {
+        "energy": taken.sum() / (ENERGY * plane),
+        "beside": taken[~broken].sum() / taken.sum(),
+        "area": area / plane,
+        "open": abs(residual) / taken.sum(),
+    }
+
+
+def draw(axes, made, value):
+    """A value of all plates over the elements in a characteristic length."""
+    for law, colour in zip(LAWS, (RED, BLUE)):
+        found = [(one.elements, getattr(one, value)) for one in made if one.law == law]
+        axes.plot(*zip(*found), "o", color=colour, label=law)
+    axes.set(xlabel="elements in a characteristic length [1]", ylim=(0.0, None))
+
+
+def picture_energy(path, made):
+    """Energy over that of the plane, and the share that is spent beside the crack."""
+    with picture(path, 1, 2, size=(7.6, 3.4)) as (_, (left, right)):
+        left.axhspan(LOW, HIGH, color=GREEN, alpha=0.3, lw=0.0)
+        draw(left, made, "energy")
+        draw(right, made, "beside")
+        left.set_ylabel("energy over G times the plane's area [1]")
+        right.set_ylabel("share spent beside the crack [1]")
+        left.legend()
+
+
+def run(options):
+    """Pull all plates apart, compare, picture."""
+    at, made = study.output_paths(options.out), []
+    runs = [*product(ELEMENTS[: options.sizes], LAWS, range(options.meshes))]
+    with ProgressBar(NAME) as bar, warnings.catch_warnings():
+        # The notch only opens: nothing has to touch in it.
+        warnings.filterwarnings("ignore", "faces of the mesh are unbonded", UserWarning)
+        for done, (elements, law, seed) in enumerate(runs):
+            bar.count(done, len(runs))
+            made.append(parted(law, elements, seed, options.speed))
+    rows = TABLE.rows(made)
+    TABLE.show(rows)
+    study.write_rows(at("cracks.csv"), rows)
+    picture_energy(at("energy.png"), made)
+    figures = {}
+    for law, n in product(LAWS, ELEMENTS[: options.sizes]):
+        these = [one for one in made if (one.law, one.elements) == (law, n)]
+        for value in ("energy", "beside"):
+            mean = float(np.mean([getattr(one, value) for one in these]))
+            figures[f"{law.replace(' ', '_')}_{value}_{n:g}"] = mean, "1"
+    study.finish(options, NAME, figures, 0.0)
+
+
+if __name__ == "__main__":
+    sys.exit(study.main(run, options_parser()))
