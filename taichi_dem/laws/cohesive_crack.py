@@ -55,8 +55,10 @@ class CohesiveCrack(BondLaw):
         return strength, cohesion, NEAR * least, material.friction, 2.0 * material.fracture_energy
 
     def declare(self, capacity: Capacity) -> None:
-        """Damage [-], energy spent [J/m^2], direction [-], slip (2) [m] of every unit."""
-        self.unit = ti.Vector.field(5, ti.f64, shape=capacity.units)
+        """Damage [-], energy spent [J/m^2], direction [-] and residual slip [m] of every unit."""
+        self.unit = ti.Vector.field(3, ti.f64, shape=capacity.units)
+        # By itself: every unit is asked for it at every step.
+        self.slip = ti.Vector.field(2, ti.f64, shape=capacity.units)
 
     @ti.func
     def _driving(self, m, stiffness, jump):
@@ -110,19 +112,19 @@ class CohesiveCrack(BondLaw):
     def _softened(self, m, u, stiffness, jump):
         """The same of a unit that is damaged, or may be from now on."""
         before = self.unit[u]
+        first = _slip(before, self.slip[u])
         unit = self._damaged(m, before, stiffness, jump)
         normal, sliding, slipped = stiffness[0] * jump[0], vec2(jump[1], jump[2]), 0.0
         shear = stiffness[1] * sliding
         if unit[0] > 0.0:
             pressure = ti.max(0.0, -normal)
-            slip = _rubbed(stiffness[1], self.law[m, 3] * pressure, sliding, _slip(unit))
-            unit[3], unit[4] = slip[0], slip[1]
+            slip = _rubbed(stiffness[1], self.law[m, 3] * pressure, sliding, first)
             if normal > 0.0:
                 normal *= 1.0 - unit[0]
             else:
-                slipped = _slipped(stiffness[1], sliding, before, unit)
+                slipped = _slipped(stiffness[1], sliding, before, unit, first, slip)
             shear = stiffness[1] * (sliding - unit[0] * slip)
-            self.unit[u] = unit
+            self.unit[u], self.slip[u] = unit, unit[0] * slip
         return vec3(normal, shear[0], shear[1]), slipped
 
     @ti.func
@@ -166,7 +168,7 @@ class CohesiveCrack(BondLaw):
         unit, sliding = self.unit[u], vec2(jump[1], jump[2])
         left = 1.0 - unit[0]
         normal = 0.5 * stiffness[0] * jump[0] * jump[0]
-        rubbing = unit[0] * squared(sliding - _slip(unit))
+        rubbing = unit[0] * squared(sliding - _slip(unit, self.slip[u]))
         if jump[0] > 0.0:
             normal *= left
             rubbing *= 0.0
@@ -185,13 +187,13 @@ class CohesiveCrack(BondLaw):
     @ti.func
     def residual_slip(self, m, u):
         """Sliding that stays when the traction is gone, in the face frame [m]."""
-        return self.unit[u][0] * _slip(self.unit[u])
+        return self.slip[u]
 
 
 @ti.func
-def _slip(unit):
-    """Slip of the damaged part of a unit [m]."""
-    return vec2(unit[3], unit[4])
+def _slip(unit, residual):
+    """Slip of the damaged part of a unit [m], whose share is its residual slip."""
+    return residual / ti.max(unit[0], 1e-300)
 
 
 @ti.func
@@ -231,20 +233,20 @@ def _rubbed(stiffness, limit, sliding, slip):
 
 
 @ti.func
-def _slipped(stiffness, sliding, before, unit):
+def _slipped(stiffness, sliding, before, unit, first, last):
     """Energy per area [J/m^2] of a pressed unit that slip takes, beside what damage spends.
 
-    The traction is stiffness (sliding - r) with r = damage slip, so that the work is that of r at
-    the mean traction, less what the elastic parts of the unit hold apart from each other.
+    first, last: slip of its damaged part [m]. The traction is stiffness (sliding - r) with r =
+    damage slip, so that the work is that of r at the mean traction, less what the elastic parts of
+    the unit hold apart from each other.
     """
-    first, last = before[0] * _slip(before), unit[0] * _slip(unit)
-    way = last - first
-    work = stiffness * dot(sliding - first - 0.5 * way, way)
-    held = 0.5 * stiffness * (_apart(unit) - _apart(before))
+    way = unit[0] * last - before[0] * first
+    work = stiffness * dot(sliding - before[0] * first - 0.5 * way, way)
+    held = 0.5 * stiffness * (_apart(unit[0], last) - _apart(before[0], first))
     return work - held - (unit[1] - before[1])
 
 
 @ti.func
-def _apart(unit):
+def _apart(damage, slip):
     """Square of the slip by which the parts of a unit pull against each other [m^2]."""
-    return unit[0] * (1.0 - unit[0]) * squared(_slip(unit))
+    return damage * (1.0 - damage) * squared(slip)
