@@ -109,7 +109,8 @@ def draw(axes, made, value):
     for law, colour in zip(LAWS, (RED, BLUE)):
         found = [(one.elements, getattr(one, value)) for one in made if one.law == law]
         axes.plot(*zip(*found), "o", color=colour, label=law)
-    axes.set(xlabel="elements in a characteristic length [1]", ylim=(0.0, None))
+    most = 1.1 * max(getattr(one, value) for one in made)
+    axes.set(xlabel="elements in a characteristic length [1]", ylim=(0.0, most))
 
 
 def picture_energy(path, made):

@@ -12,8 +12,8 @@ from taichi_dem.kit.types import real
 from taichi_dem.materials.body_materials import MOST
 from taichi_dem.state.model import MANY, ROLES, Model
 
-#: Spare entries of a list of pairs: it must not be as long as a field of bodies, faces or bonds.
-_SPARE = 64
+#: One more entry: no list of pairs may be as long as a field of bodies, faces or bonds.
+_SPARE = 1
 #: Entries of one list, whose indices are counted in 32 bits.
 _MOST_ENTRIES = 2**31 - 1
 

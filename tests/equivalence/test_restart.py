@@ -224,11 +224,11 @@ def test_every_array_of_a_checkpoint_must_be_there_and_like_its_own(light, tmp_p
 
 
 #: Room for pairs, contacts and neighbours that is too short, on the way or at the start.
-SHORT = {"contacts": (2**14, 16, 2**16), "neighbours": (2**14, 2**16, 16)}
+SHORT = {"pairs": (4, 2**16, 2**16), "neighbours": (2**14, 2**16, 16)}
 
 
 @pytest.mark.parametrize("case", ["controlled"], indirect=True)
-@pytest.mark.parametrize("lists", ["contacts", pytest.param("neighbours", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("lists", ["pairs", pytest.param("neighbours", marks=pytest.mark.slow)])
 def test_lists_that_grow_give_the_bits_of_long_ones(case, run, straight, lists, monkeypatch):
     """A search that finds no room is made again, in an engine with more."""
     # The other run's engine is the one with more room.
