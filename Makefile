@@ -75,8 +75,8 @@ fuzz: $(STAMP) ## run random scenes, also with every access to a field checked (
 test-forks: $(FORKS:%=.venv-%/stamp) ## run FORK_TESTS on forks of Taichi, Quadrants and Forge; list what differs
 	@mkdir -p results
 	@for fork in $(FORKS); do echo "$$fork:"; \
-	  TAICHI_DEM_PATCHES=off $(subst .venv,.venv-$$fork,$(BIN))/python -m pytest -q --tb line -rfE $(FORK_TESTS) $(TEST_OPTIONS) \
-	  >results/$$fork.txt 2>&1; tail -n 1 results/$$fork.txt; done
+	  TAICHI_DEM_PATCHES=off $(subst .venv,.venv-$$fork,$(BIN))/python -m pytest -q -W ignore::SyntaxWarning \
+	  --tb line -rfE $(FORK_TESTS) $(TEST_OPTIONS) >results/$$fork.txt 2>&1; tail -n 1 results/$$fork.txt; done
 	@echo "What differs is listed in results/quadrants.txt and results/forge.txt"
 
 wheel: $(STAMP) ## build the wheel into dist/ and run it in an empty environment (PYTHONS="python3.12 ...": in several)
