@@ -1,26 +1,18 @@
 """Output of a scene to a tolerance: the program chooses method and step, and gives a bar."""
 
-import math
 from collections.abc import Iterable
 
-from taichi_dem.accuracy.runs import Job
-from taichi_dem.accuracy.search import Search
+from taichi_dem.accuracy.levels import Levels
+from taichi_dem.accuracy.runs import Runs
 from taichi_dem.accuracy.sources import MEASURED
 from taichi_dem.goals import Goal
 from taichi_dem.kit.bars.answer import Answer, Plan
-from taichi_dem.kit.bars.budget import named_sources
+from taichi_dem.kit.bars.runs import checked_question
+from taichi_dem.kit.bars.search import Search
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import Listener
 from taichi_dem.kit.progress_bar import reporting
-from taichi_dem.kit.validation import (
-    AUTO,
-    SMALLEST,
-    between,
-    instance,
-    positive,
-    several,
-    whole,
-)
+from taichi_dem.kit.validation import AUTO, instance, positive, several, whole
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.scene import Scene
 
@@ -85,20 +77,24 @@ def solve(
     instance("scene", scene, Scene)
     instance("goal", goal, Goal).check_scene(scene)
     positive("until", until)
-    between("tolerance", tolerance, SMALLEST, 1.0)
-    between("confidence", confidence, SMALLEST, math.nextafter(1.0, 0.0))
-    budget = math.inf if budget_s is None else positive("budget_s", budget_s)
+    question = checked_question(
+        *((goal,), MEASURED),
+        tolerance=tolerance,
+        confidence=confidence,
+        budget_s=budget_s,
+        sources=sources,
+    )
     first = 0 if plan is None else whole("begin of plan", instance("plan", plan, Plan).begin, 0, 99)
-    named = named_sources(sources, MEASURED)
     others = () if meshes is None else several("meshes", meshes, _mesh)
-    if ("mesh" in named) != bool(others) or len(others) == 1:
+    if ("mesh" in question.sources) != bool(others) or len(others) == 1:
         raise InputError(
             "meshes must be two or more where sources name the mesh, and none elsewhere, "
-            f"got {len(others)} and sources {', '.join(named)}"
+            f"got {len(others)} and sources {', '.join(question.sources)}"
         )
-    job = Job(scene, until, goal, tolerance, confidence, named, others)
-    with reporting(progress, goal.name) as report_progress:
-        return Search(job, budget, report_progress, first).answer()
+    levels = Levels(scene, until, goal)
+    with reporting(progress, goal.name) as listener:
+        runs = Runs(levels, listener, question, others)
+        return Search(question, runs, first).answers()[0]
 
 
 def _mesh(name, given):

@@ -11,10 +11,11 @@ import numpy as np
 from ca_damper.batch import Batch
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.measures import COLUMNS, Cycles
-from ca_damper.report.steady_state import BATCHES, SteadyPart, steady_part
+from ca_damper.report.steady_state import SteadyPart, steady_part
 from ca_damper.runs.response import measures_of
 from ca_damper.scenes.clock import steps_per_cycle
 from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit.bars.runs import BudgetSpent
 from taichi_dem.kit.progress import Listener
 
 #: Scenes of a batch and cycles of a run: an engine has room for so many at least, so that further
@@ -22,14 +23,6 @@ from taichi_dem.kit.progress import Listener
 SCENES, CYCLES = 64, 32
 # Cycles of a scene after which it is taken as it is, with what its drift is known to be.
 _MOST_CYCLES = 20_000
-
-
-class BudgetSpent(Exception):
-    """The next runs would exceed the budget. needed: time of all runs with them [s]."""
-
-    def __init__(self, needed: float):
-        super().__init__(needed)
-        self.needed = needed
 
 
 class SceneKey(NamedTuple):
@@ -69,6 +62,10 @@ class SceneRuns:
     def cycles(self, key: SceneKey) -> int:
         """Number of cycles that a scene has gone."""
         return len(self._records[key]) if key in self._records else 0
+
+    def longest(self) -> int:
+        """Most cycles that a scene has gone."""
+        return max(map(len, self._records.values()))
 
     def steps_per_cycle(self, ratio: float, dt: float) -> int:
         """Steps of a cycle at a frequency ratio, none longer than dt [s]."""
@@ -139,16 +136,9 @@ class SceneRuns:
         """Measures of every cycle of a scene, each (cycles,), by name."""
         return measures_of(self.oscillator, self._cycles(key, self._records[key][:, None]))
 
-    def measures(self, key: SceneKey, begin: int, leave_out: int = 0) -> dict[str, np.ndarray]:
+    def measures(self, key: SceneKey, begin: int) -> dict[str, np.ndarray]:
         """Measures of a scene from cycle ``begin`` on, each (1,), by name."""
-        kept = self._records[key][begin:]
-        rows = kept[None]
-        if leave_out:
-            length = len(kept) // leave_out
-            kept = kept[len(kept) - leave_out * length :]
-            part = np.arange(len(kept)) // length
-            rows = np.stack([kept[part != k] for k in range(leave_out)])
-        return measures_of(self.oscillator, self._cycles(key, rows))
+        return measures_of(self.oscillator, self._cycles(key, self._records[key][begin:][None]))
 
     def _cycles(self, key, record):
         frequency = np.full(len(record), key.ratio * self.oscillator.natural_frequency)
@@ -168,19 +158,15 @@ class SteadyRuns:
         self.runs, self.budget_s, self.further = runs, budget_s, further
         self.parts: dict[SceneKey, SteadyPart] = {}
 
-    def begins(self) -> dict[SceneKey, int]:
-        """Cycle from which on each scene is steady, in whole batches."""
-        return {
-            key: part.begin + (self.runs.cycles(key) - part.begin) % BATCHES
-            for key, part in self.parts.items()
-        }
-
     def is_full(self, keys: Iterable[SceneKey]) -> bool:
         """Whether no scene may go on any further."""
         return min(map(self.runs.cycles, keys)) >= _MOST_CYCLES
 
     def go_on(self, keys: Iterable[SceneKey], drift: float, least: int, window: int) -> None:
-        """Let scenes go on until all seeds are steady for a window of cycles."""
+        """Let scenes go on until all seeds are steady for a window of cycles.
+
+        Where the budget ends, those that have gone so many as least are taken as they are.
+        """
         groups = _groups(keys)
         while True:
             more: dict[SceneKey, int] = {}
@@ -188,7 +174,14 @@ class SteadyRuns:
                 more.update(self._missing(group, drift, least, window))
             if not more:
                 return
-            self._go_within_budget(more)
+            try:
+                self._go_within_budget(more)
+            except BudgetSpent:
+                if min(self.runs.cycles(key) for group in groups for key in group) < least:
+                    raise
+                for group in groups:
+                    self._check(group, drift)
+                return
 
     def _go_within_budget(self, more: dict[SceneKey, int]) -> None:
         """Let scenes go on by so many cycles; BudgetSpent where they would take too long."""
@@ -214,11 +207,6 @@ class SteadyRuns:
         # In eighths of a run.
         count = min(8 * math.ceil(more / 8.0), _MOST_CYCLES - gone)
         return dict.fromkeys(group, count) if count > 0 else {}
-
-    def check_steady(self, keys: Iterable[SceneKey], drift: float) -> None:
-        """Check by the cycles that all seeds have from when on they are steady."""
-        for group in _groups(keys):
-            self._check(group, drift)
 
     def _check(self, group, drift):
         shortest = min(map(self.runs.cycles, group))

@@ -9,7 +9,8 @@ import pandas as pd
 import ca_damper as ca
 import taichi_dem as dem
 from cases.questions import BlastQuestion, DamperQuestion
-from taichi_dem.accuracy.runs import Job, Runs
+from taichi_dem.accuracy.levels import Levels
+from taichi_dem.accuracy.runs import Runs
 from taichi_dem.kit import study
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.checkpoint import digest, identity_of
@@ -86,9 +87,9 @@ def _top(ratios, curve, goal):
     return at_peak[goal.unit == "m"]
 
 
-def job_of(question):
-    """The question as ``solve`` has it."""
-    return Job(question.scene, question.until, question.goal, question.tolerance, 0.95)
+def levels_of(question):
+    """Steps of the runs that ``solve`` makes."""
+    return Levels(question.scene, question.until, question.goal)
 
 
 def asked_blast(question):
@@ -96,11 +97,11 @@ def asked_blast(question):
     begun, given = study.clock(), {"until": question.until, "goal": question.goal}
     answer = dem.solve(question.scene, tolerance=question.tolerance, progress=None, **given)
     seconds = study.clock() - begun
-    job, level = job_of(question), answer.plan.begin + 1 + FINER
-    step = job.method(level).dt0
+    levels, level = levels_of(question), answer.plan.begin + 1 + FINER
+    step = levels.method(level).dt0
 
     def measure():
-        true = Runs(job, None).value(level)
+        true = Runs(levels).value(level)
         return math.nan if true is None else true, 0.0, step
 
     return answer, seconds, step, measure
@@ -170,7 +171,7 @@ class References:
 def content_of(question):
     """A word for all that a question is made of."""
     if isinstance(question, BlastQuestion):
-        identity = run_identity(question.scene, job_of(question).method(0))
+        identity = run_identity(question.scene, levels_of(question).method(0))
         parts = [words for name, words in identity.items() if name != "version"]
         return digest([str(question), *parts])
     parts = question.filling, question.oscillator

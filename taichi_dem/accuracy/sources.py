@@ -1,18 +1,14 @@
-"""Sources of error beside the step: chance, the contact law, the mesh, effects left out."""
+"""Sources of error beside the step: the contact law, the mesh, effects left out."""
 
 import contextlib
 import copy
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from taichi_dem.accuracy.runs import Job, Runs
-from taichi_dem.kit.bars.answer import Answer, branched, branches_of
 from taichi_dem.kit.bars.budget import Source
-from taichi_dem.kit.bars.chance import clusters_of, mean_and_deviation, t_quantile
+from taichi_dem.kit.bars.chance import mean_and_deviation, t_quantile
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.laws.body_geometry import MOST_PARTS, BodyGeometry
 from taichi_dem.laws.contact import BodyContact, SphereContact
@@ -30,32 +26,28 @@ _LEAST_AWAKE = 1e-3
 COMMON = {False: 0.008, True: 0.03}
 #: Times that a run with four times the rays takes longer, about.
 _RAYS = 4.0
-#: Share of what is allowed below which a single twin is enough to know of chance.
-NEGLIGIBLE = 0.25
-#: Runs of which a spread is taken at first, and at most.
-_FEW, MANY = 6, 96
-#: Runs there must be of each end, on average, to call it one: more ends are a distribution.
-_OF_EACH = 3
 
 
 @dataclass(frozen=True)
 class Beside:
     """Measures errors that no shorter step reduces, by runs at the coarsest level."""
 
-    job: Job
-    runs: Runs
+    runs: Any
     level: float
     report: Any
     affords: Callable[[float], bool]
-    eventful: bool = False
 
-    def sources(self) -> Iterator[Source]:
+    def sources(self, last: float) -> Iterator[Source]:
         """Sources that the scene has, measured where the question asks for them."""
-        law = self.job.scene.effect("contact")
+        law = self._scene.effect("contact")
         if law is not None:
             yield self._contact(law)
-        yield self._mesh()
+        yield self._mesh(self.runs.eventful(last))
         yield self._left_out()
+
+    @property
+    def _scene(self):
+        return self.runs.levels.scene
 
     def _contact(self, law):
         if not self.report.pair_evaluations:
@@ -66,28 +58,28 @@ class Beside:
         words = f"one run with parts={finer.geometry.parts}"
         if not self._measures("contact", _RAYS):
             return self._unmeasured("contact", words, _RAYS)
-        values, seconds = self._values([with_contact(self.job.scene, finer)])
+        values, seconds = self._values([with_contact(self._scene, finer)])
         error = share * abs(values[0] - self.runs.value(self.level)) if values else math.inf
         return Source("contact", error, words if values else f"{words} diverged", seconds)
 
-    def _mesh(self):
+    def _mesh(self, eventful):
         """Spread over meshes of one size: half-width for the value on one of them."""
-        if not self._measures("mesh", len(self.job.meshes)):
+        if not self._measures("mesh", len(self.runs.meshes)):
             unknown = self._unmeasured("mesh", "give other meshes of this size", 2.0)
-            common = COMMON[self.eventful] * abs(self.runs.value(self.level))
+            common = COMMON[eventful] * abs(self.runs.value(self.level))
             return replace(unknown, common=common)
-        count = f"{len(self.job.meshes) + 1} meshes"
+        count = f"{len(self.runs.meshes) + 1} meshes"
         values, seconds = self._values(
-            [replace(self.job.scene, mesh=mesh) for mesh in self.job.meshes]
+            [replace(self._scene, mesh=mesh) for mesh in self.runs.meshes]
         )
-        if len(values) < len(self.job.meshes):
+        if len(values) < len(self.runs.meshes):
             return Source("mesh", math.inf, f"{count}, of which one diverged", seconds)
         spread = mean_and_deviation([self.runs.value(self.level), *values])[1]
-        error = spread * t_quantile(self.job.confidence, len(values))
+        error = spread * t_quantile(self.runs.question.confidence, len(values))
         return Source("mesh", error, f"spread over {count}", seconds)
 
     def _measures(self, name, runs):
-        return name in self.job.sources and self.affords(runs)
+        return name in self.runs.question.sources and self.affords(runs)
 
     def _unmeasured(self, name, words, runs):
         seconds = runs * self.runs.cost[self.level]
@@ -98,7 +90,7 @@ class Beside:
         values, seconds = [], 0.0
         self.runs.release()
         for scene in scenes:
-            made = Runs(replace(self.job, scene=scene), self.runs.listen)
+            made = self.runs.of(scene)
             # A scene that cannot begin raises instead.
             with contextlib.suppress(SimulationDiverged):
                 values.append(made.value(self.level))
@@ -117,7 +109,7 @@ class Beside:
         return Source("left out", math.nan, words, awake_price(self.runs, found))
 
 
-def awake_price(runs: Runs, certificate: Any) -> float:
+def awake_price(runs: Any, certificate: Any) -> float:
     """CPU time of the same runs with all bodies awake [s], about."""
     return runs.seconds / max(_LEAST_AWAKE, 1.0 - certificate.asleep)
 
@@ -146,64 +138,3 @@ def with_contact(scene: Scene, law: Any) -> Scene:
         return replace(scene, effects=effects)
     loads = [one for one in scene.loads if one.role != law.role]
     return replace(scene, effects=scene.effects.word, loads=[*loads, law])
-
-
-class Twins:
-    """Twins of the run at one level; parted: whether those of a level before differed too much."""
-
-    def __init__(self, job: Job, runs: Runs, affords: Callable[[float, float], bool]):
-        self.job, self.runs, self.affords = job, runs, affords
-        self.count, self.level, self.parted = 0, 0.0, False
-
-    def go_to(self, level: float) -> None:
-        """Begin anew at a finer level: at the one before, twins may part by the step alone."""
-        self.count, self.level, self.parted = 0, level, True
-
-    def sample(self, level: float) -> list[float]:
-        """Values of a run and its twins that did not diverge, as many as were asked for."""
-        found = (self.runs.value(level, twin) for twin in range(self.count + 1))
-        return [value for value in found if value is not None]
-
-    def spread(self, levels: Sequence[float], allowed: float, is_last: bool) -> float:
-        """Half-width by which runs that differ by chance spread, of one or of their mean."""
-        # Twins cannot separate if half the step breaks the same faces and hardly moves bodies.
-        averaged = self.job.goal.averaged
-        if self.count == 0:
-            if not averaged and not self.parted and self._is_calm(*levels[-2:]):
-                return 0.0
-            if not self.affords(1.0, self.level):
-                return math.inf
-            self.count = 1
-        if self.count == 1 and not averaged and self.job.goal.kind != "count":
-            here, twin = self.runs.value(self.level), self.runs.value(self.level, 1)
-            apart = math.inf if twin is None else abs(twin - here)
-            bar = t_quantile(self.job.confidence, 1) * apart
-            if bar <= NEGLIGIBLE * allowed or (apart > allowed and not is_last):
-                return bar
-        if self.count < _FEW - 1 and self.affords(_FEW - 1.0 - self.count, self.level):
-            self.count = _FEW - 1
-        spread = self.deviation() * t_quantile(self.job.confidence, self.count)
-        # Of a single value the truth is another one, as far from the mean.
-        return spread / math.sqrt(self.count + 1) if averaged else math.sqrt(2.0) * spread
-
-    def _is_calm(self, coarse, fine):
-        """Whether half the step moves a usual body by little, and breaks the same faces."""
-        change = self.runs.change(coarse, fine)
-        little = change <= NEGLIGIBLE * self.job.tolerance
-        return little and self.runs.same_breaks(coarse, fine)
-
-    def deviation(self) -> float:
-        """Standard deviation of single runs; infinite where one diverged."""
-        found = self.sample(self.level)
-        return mean_and_deviation(found)[1] if len(found) > self.count else math.inf
-
-    def branched(self, made: Answer, allowed: float, step: float) -> Answer:
-        """The answer with its branches, where twins have a few outcomes; else unchanged."""
-        values = np.array(self.sample(self.level))
-        clusters = clusters_of(values, 0.0, 0.5 * allowed)
-        few = 2 <= len(clusters) <= len(values) // _OF_EACH
-        if self.job.goal.averaged or not few:
-            return made
-        branches = branches_of(values, clusters, range(len(values)), step, 1.0)
-        ends = "that differ by chance had {} outcomes"
-        return branched(made, branches, made.parts.step, "run", ends)

@@ -17,7 +17,8 @@ from taichi_dem import (
     simulate,
     solve,
 )
-from taichi_dem.accuracy.runs import Job, Runs
+from taichi_dem.accuracy.levels import Levels
+from taichi_dem.accuracy.runs import Runs
 from taichi_dem.mesh.shapes import placed_together, single
 from tests.scenes import BROKEN_UNTIL, UNTIL, broken_bar, struck_bar
 from tests.structures import filled
@@ -27,8 +28,7 @@ ENERGY = goals.kinetic_energy()
 
 def finer(scene, until, goal, answer, levels=3):
     """Value of a goal with the step of an answer over 2^levels."""
-    job = Job(scene, until, goal, answer.tolerance, answer.confidence)
-    return Runs(job, None).value(answer.plan.begin + 1 + levels)
+    return Runs(Levels(scene, until, goal)).value(answer.plan.begin + 1 + levels)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def test_a_run_has_the_same_report_whatever_was_asked_before(monkeypatch):
         return simulate(broken_bar(), method=method, until=until, progress=None).report.known_error
 
     before = known()
-    monkeypatch.setattr(Runs, "parting", lambda self, level: 1e-5)
+    monkeypatch.setattr(Runs, "parting", lambda self, level, tolerance: 1e-5)
     answer = solve(broken_bar(), until=BROKEN_UNTIL, goal=ENERGY, progress=None)
     assert answer.plan.parting_s == 1e-5 and "1e-05 s" in str(answer)
     assert known() == before
@@ -95,7 +95,7 @@ GOALS = ENERGY, goals.displacement("left"), goals.broken_faces()
 
 def both(scene, until, goal=GOALS[0]):
     """A brief run and a whole one of a scene."""
-    runs = Runs(Job(scene, until, goal, 0.01, 0.95), None)
+    runs = Runs(Levels(scene, until, goal))
     return [runs._simulated(0, 0, False, 1, brief) for brief in (True, False)]
 
 
@@ -125,18 +125,18 @@ def test_a_question_about_bodies_within_each_other_is_refused():
     parts = {"one": (single(0.05), (0.0, 0.0, 0.0)), "other": (single(0.05), (1e-3, 0.0, 0.0))}
     contact = effects.SphereContact(outer_faces=True)
     scene = Scene(placed_together(parts), CONCRETE, filled("held", contact, group="one_base"))
-    job = Job(scene, 1e-6, GOALS[0], 0.1, 0.95)
+    levels = Levels(scene, 1e-6, GOALS[0])
     whole = refusal(lambda: Simulation(scene, ImplicitDashpots(1e-8)).start())
     assert "share" in whole
     assert refusal(lambda: solve(scene, until=1e-6, goal=GOALS[0], tolerance=0.1)) == whole
-    assert refusal(lambda: Runs(job, None)._simulated(0, 0, False, 1, True)) == whole
+    assert refusal(lambda: Runs(levels)._simulated(0, 0, False, 1, True)) == whole
 
 
 def test_a_brief_report_does_not_say_what_nobody_looked_for():
     """Bodies that share 14 % where no contact is listed."""
     parts = {"one": (single(0.05), (0.0, 0.0, 0.0)), "other": (single(0.05), (0.02, 0.0, 0.0))}
     scene = Scene(placed_together(parts), CONCRETE, filled("bonds", group="one_base"))
-    runs = Runs(Job(scene, 1e-7, GOALS[0], 0.1, 0.95), None)
+    runs = Runs(Levels(scene, 1e-7, GOALS[0]), None)
     brief, whole = (runs._simulated(0, 0, False, 1, one).report for one in (True, False))
     assert brief.interpenetration is None and whole.interpenetration.share > 0.1
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, effects, goals, solve
-from taichi_dem.accuracy.runs import BEFORE, change, extreme_doubts
+from taichi_dem.accuracy.extremes import BEFORE, change, extreme_doubts
 from taichi_dem.goals import Goal
 from tests.made_result import made_result
 from tests.scenes import apart
@@ -26,7 +26,7 @@ class History:
 
     def __init__(self, history, read):
         goal = Goal("made up", "N", lambda result: read(result.series["force_N"]), "extreme")
-        self.history, self.job = history, SimpleNamespace(goal=goal, until=1.0)
+        self.history, self.levels = history, SimpleNamespace(goal=goal, until=1.0)
         self.results, self.longer = {0: self.until(1.0)}, 0
 
     def until(self, end):
@@ -34,14 +34,14 @@ class History:
         return replace(MADE, series={"time_s": t, "force_N": self.history(t)})
 
     def value(self, level):
-        return self.job.goal.value(self.results[level])
+        return self.levels.goal.value(self.results[level])
 
     def late_change(self, level):
-        return change(self.job.goal, self.results[level], BEFORE, MADE.peak_speed)
+        return change(self.levels.goal, self.results[level], BEFORE, MADE.peak_speed)
 
     def longer_change(self, level):
         self.longer += 1
-        return change(self.job.goal, self.until(1.0 / BEFORE), 1.0, MADE.peak_speed)
+        return change(self.levels.goal, self.until(1.0 / BEFORE), 1.0, MADE.peak_speed)
 
 
 def doubts(history, read=np.max, bar=1e-3, budget=9.0):

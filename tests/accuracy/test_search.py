@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, InputError, Scene, goals
-from taichi_dem.accuracy import search, sources
-from taichi_dem.accuracy.runs import Job
+from taichi_dem.accuracy.levels import Levels
+from taichi_dem.accuracy.runs import Runs
 from taichi_dem.effects import BodyContact
 from taichi_dem.kit.bars.chance import t_quantile
+from taichi_dem.kit.bars.runs import Question
+from taichi_dem.kit.bars.search import Search
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.report.energy_balance import TERMS
 from tests.scenes import UNTIL, struck_bar
@@ -20,8 +22,8 @@ from tests.scenes import UNTIL, struck_bar
 NOTHING = dict.fromkeys(TERMS, 0.0)
 
 
-class MadeUpRuns:
-    """Values by level and twin from a formula, in place of ``taichi_dem.accuracy.runs.Runs``.
+class MadeUpRuns(Runs):
+    """Values by level and twin from a formula.
 
     formula(level, twin): a value, None for a run that diverges. moved: way of a usual body between
     two levels. events: whether anything broke. certificate: of each run. residual: energy [J] that
@@ -30,11 +32,11 @@ class MadeUpRuns:
     """
 
     formula, moved, events, certificate, residual, pairs = None, 0.0, False, None, 0.0, 0
-    listen = None
+    failure = "it diverged"
 
-    def __init__(self, job, listen):
-        self.job, self.seconds, self.count, self.failure = job, 0.0, 0, "it diverged"
-        self.results, self.cost, self.known = {}, {}, {}
+    def __init__(self, *given):
+        super().__init__(*given)
+        self.known = {}
 
     def value(self, level, twin=0, tight=False):
         key = level, twin, tight
@@ -58,7 +60,7 @@ class MadeUpRuns:
         """The level of the steps that are made, of which there is a whole number."""
         if level == round(level):
             return level
-        return math.log2(self.job.method(0).dt0 / self.job.method(level).dt0)
+        return math.log2(self.step(0) / self.step(level))
 
     def eventful(self, level):
         return self.events
@@ -74,18 +76,19 @@ class MadeUpRuns:
     def same_breaks(self, coarse, fine):
         return not self.events
 
-    def parting(self, level):
+    def parting(self, level, tolerance):
         return 0.5
 
 
 @pytest.fixture
-def searched(monkeypatch):
-    """Answer of a search over made-up runs, by a question and members of ``MadeUpRuns``."""
+def searched():
+    """Answer of a search over made-up runs, by a question, a formula, and members of the runs."""
 
-    def answer(question, formula, budget=math.inf, first=0, **members):
-        made = type("Runs", (MadeUpRuns,), {"formula": staticmethod(formula), **members})
-        monkeypatch.setattr(search, "Runs", made)
-        return search.Search(question, budget, None, first).answer()
+    def answer(question, formula, budget=math.inf, first=0, until=UNTIL, scene=None, **members):
+        made = type("Made", (MadeUpRuns,), {"formula": staticmethod(formula), **members})
+        question = replace(question, budget_s=budget)
+        runs = made(levels_of(question, until, scene), None, question)
+        return Search(question, runs, first).answers()[0]
 
     return answer
 
@@ -99,10 +102,14 @@ def scattered(spread, centre=3.0):
     return formula
 
 
-def job(tolerance=0.01, goal=None, damping=True):
+def asked(tolerance=0.01, goal=None):
     """A question whose runs are made up."""
-    asked = goals.displacement("right") if goal is None else goal
-    return Job(struck_bar(damping), UNTIL, asked, tolerance, 0.95)
+    return Question((goals.displacement("right") if goal is None else goal,), tolerance)
+
+
+def levels_of(question, until=UNTIL, scene=None):
+    """Steps of the runs that a question is answered by, of the struck bar if no other."""
+    return Levels(struck_bar() if scene is None else scene, until, question.goals[0])
 
 
 def power(order, factor=0.3, limit=3.0):
@@ -113,7 +120,7 @@ def power(order, factor=0.3, limit=3.0):
 @pytest.mark.parametrize("tolerance", [0.1, 1e-3, 1e-4])
 @pytest.mark.parametrize(("order", "events"), [(2.0, False), (1.0, True)])
 def test_bars_of_a_power_law_hold_and_are_not_too_wide(searched, tolerance, order, events):
-    answer = searched(job(tolerance), power(order), events=events)
+    answer = searched(asked(tolerance), power(order), events=events)
     off = abs(answer.value - 3.0)
     if not answer.reached:
         # Seven halvings from the first step are the most.
@@ -124,7 +131,7 @@ def test_bars_of_a_power_law_hold_and_are_not_too_wide(searched, tolerance, orde
 
 
 def test_a_value_that_agrees_by_chance_has_the_bar_of_what_usual_bodies_do(searched):
-    answer = searched(job(0.05), lambda level, twin: 3.0, moved=0.06)
+    answer = searched(asked(0.05), lambda level, twin: 3.0, moved=0.06)
     assert answer.error == pytest.approx(1.1 / 3.0 * 0.06 * 3.0)
 
 
@@ -133,8 +140,7 @@ def test_a_value_that_agrees_by_chance_has_the_bar_of_what_usual_bodies_do(searc
 def test_two_runs_support_no_bar_below_a_third_of_the_tolerance(searched, tolerance, averaged):
     """Nor do twins that differ by rounding. It costs no run, and what was asked is reached."""
     goal = goals.displacement("right")
-    asked = job(tolerance, goal.mean() if averaged else goal)
-    answer = searched(asked, power(2.0, 1e-6))
+    answer = searched(asked(tolerance, goal.mean() if averaged else goal), power(2.0, 1e-6))
     assert answer.reached and answer.error == pytest.approx(tolerance * answer.value / 3.0)
     assert answer.plan.runs == (2 if not averaged else 2 + 5 * 2)
     assert answer.sources[0].error == pytest.approx(answer.error)
@@ -143,15 +149,15 @@ def test_two_runs_support_no_bar_below_a_third_of_the_tolerance(searched, tolera
 @pytest.mark.parametrize(("budget", "runs"), [(math.inf, 3), (3.5, 2)])
 def test_the_same_number_twice_is_confirmed_by_a_third_step(searched, budget, runs):
     """Or has the bar of two, where no budget is left for it."""
-    answer = searched(job(0.01), lambda level, twin: 3.0, budget=budget)
+    answer = searched(asked(0.01), lambda level, twin: 3.0, budget=budget)
     assert answer.plan.runs == runs and answer.reached
     assert answer.error == pytest.approx(0.0 if runs > 2 else 0.01 * 3.0 / 3.0)
-    other = searched(job(0.01), lambda level, twin: 3.0 if level < 1.5 else 2.0)
+    other = searched(asked(0.01), lambda level, twin: 3.0 if level < 1.5 else 2.0)
     assert not other.reached or abs(other.value - 2.0) <= other.error
 
 
 def test_twins_that_scatter_get_no_single_number(searched):
-    answer = searched(job(0.01), scattered(0.3), events=True, moved=0.1)
+    answer = searched(asked(0.01), scattered(0.3), events=True, moved=0.1)
     assert not answer.reached and answer.error > 0.01 * answer.value
     assert "goal.mean()" in answer.shortfall
     # Half-width of single runs: about twice the standard deviation, and more for few of them.
@@ -165,7 +171,7 @@ def test_chance_that_falls_with_the_step_is_followed(searched):
     standard deviation, 0.1.
     """
     answer = searched(
-        job(0.05),
+        asked(0.05),
         lambda level, twin: 3.0 + 0.2 * 4.0**-level * (twin % 2),
         events=True,
         moved=0.02,
@@ -180,7 +186,7 @@ def test_levels_that_agree_once_twins_have_parted_are_asked_again(searched):
     """From level 2 on bodies move alike; each other twin is off by ten times what is allowed."""
     ways = {"change": lambda self, coarse, fine: 0.1 * (fine < 3)}
     answer = searched(
-        job(0.01),
+        asked(0.01),
         lambda level, twin: 3.0 + 0.3 * (twin % 2) * (level < 4),
         **ways,
         same_breaks=lambda self, *levels: True,
@@ -192,7 +198,7 @@ def test_levels_that_agree_once_twins_have_parted_are_asked_again(searched):
 @pytest.mark.parametrize("value", [52.0, 520.0])
 def test_a_count_of_what_breaks_is_known_to_one_at_best(searched, value):
     """To 1 %, which is half of a face, or five; all levels agree."""
-    many = job(0.01, goals.broken_faces())
+    many = asked(0.01, goals.broken_faces())
     answer = searched(many, lambda level, twin: value, events=True, moved=0.0)
     assert answer.error == 1.0 and answer.reached == (value > 100.0)
     assert ("broken faces is known to one" in answer.shortfall) != answer.reached
@@ -205,20 +211,20 @@ def test_runs_are_made_again_with_a_tenth_more_steps_where_nothing_happens(
     searched, events, long, again
 ):
     """And with 16 more at least, up to twice as many: the short run has 9."""
-    asked = replace(job(0.5), until=long * UNTIL)
-    answer = searched(asked, power(1.0), events=events, moved=0.02)
+    given = {"until": long * UNTIL, "events": events, "moved": 0.02}
+    answer = searched(asked(0.5), power(1.0), **given)
     steps = answer.plan.seconds - 1.0 - 1.0 * events
     assert steps == pytest.approx(again), "a twin of an eventful run is the third"
     least = 1.0 + again * (1.0 + 1e-9)
-    assert searched(asked, power(1.0), budget=least, events=events, moved=0.02).plan.runs == 2
+    assert searched(asked(0.5), power(1.0), budget=least, **given).plan.runs == 2
     with pytest.raises(InputError, match="budget_s must be at least"):
-        searched(asked, power(1.0), budget=0.99 * least, events=events)
+        searched(asked(0.5), power(1.0), budget=0.99 * least, **given)
 
 
 def test_a_twin_makes_up_to_30_percent_more_steps():
-    asked = replace(job(), until=20.0 * UNTIL)
+    levels = levels_of(asked(), 20.0 * UNTIL)
     for level in (0, 1, math.log2(1.1)):
-        steps = [round(asked.until / asked.method(level, twin=twin).dt0) for twin in range(6)]
+        steps = [round(levels.until / levels.method(level, twin=twin).dt0) for twin in range(6)]
         assert steps[0] == min(steps) and max(steps) <= 1.3 * steps[0] + 0.5
         assert len(set(steps)) == 6
 
@@ -227,7 +233,7 @@ def test_a_twin_makes_up_to_30_percent_more_steps():
 def test_a_certificate_that_does_not_hold_is_never_reached(searched, failure):
     """All levels agree: the bar is zero."""
     certificate = SimpleNamespace(holds=not failure, failure=failure, asleep=0.5)
-    answer = searched(job(), lambda level, twin: 3.0, certificate=certificate)
+    answer = searched(asked(), lambda level, twin: 3.0, certificate=certificate)
     assert answer.error == 0.0 and answer.reached == (not failure)
     assert failure in answer.shortfall
     left = answer.sources[-1]
@@ -239,21 +245,23 @@ def test_a_certificate_that_does_not_hold_is_never_reached(searched, failure):
 def test_an_answer_whose_energy_is_lost_is_not_reached(searched):
     """Of the joule that went through the run, less than half is missing, or more."""
     for residual, reached in ((0.4, True), (0.6, False)):
-        answer = searched(job(), lambda level, twin: 3.0, residual=residual)
+        answer = searched(asked(), lambda level, twin: 3.0, residual=residual)
         assert answer.reached == reached
     assert "leaves 0.6 J unexplained" in answer.shortfall
 
 
 @pytest.mark.parametrize(("off", "reached"), [(0.02, True), (0.3, False)])
-def test_what_only_a_source_beside_the_step_breaks_is_refused_in_words(
-    searched, monkeypatch, off, reached
-):
+def test_what_only_a_source_beside_the_step_breaks_is_refused_in_words(searched, off, reached):
     """Of second order in 1/parts: bodies with twice the rays differ by 3/4 of the error."""
     formula = staticmethod(lambda level, twin: 3.0 + 0.75 * off)
-    monkeypatch.setattr(sources, "Runs", type("Finer", (MadeUpRuns,), {"formula": formula}))
+    finer = type("Finer", (MadeUpRuns,), {"formula": formula})
     scene = Scene(bar(0.1, 0.05, (1, 1, 1)), CONCRETE, [BodyContact(3)])
-    asked = Job(scene, UNTIL, goals.kinetic_energy(), 0.01, 0.95, ("step", "contact"))
-    answer = searched(asked, lambda level, twin: 3.0, pairs=1)
+
+    def of(self, scene):
+        return finer(replace(self.levels, scene=scene))
+
+    measured = Question((goals.kinetic_energy(),), sources=("step", "contact"))
+    answer = searched(measured, lambda level, twin: 3.0, scene=scene, pairs=1, of=of)
     assert answer.error == answer.parts.contact == pytest.approx(off, rel=1e-9)
     assert answer.reached == reached
     words = "the contact moves it by 10 %, which no shorter step reduces"
@@ -261,15 +269,15 @@ def test_what_only_a_source_beside_the_step_breaks_is_refused_in_words(
 
 
 def test_the_mean_of_runs_that_scatter_is_found(searched):
-    asked = job(0.05, goals.displacement("right").mean())
-    answer = searched(asked, scattered(0.1), events=True)
+    mean = asked(0.05, goals.displacement("right").mean())
+    answer = searched(mean, scattered(0.1), events=True)
     assert answer.reached and abs(answer.value - 3.0) <= answer.error <= 0.15
     assert 6 <= answer.plan.runs <= 200
 
 
 def test_runs_that_come_to_two_ends_are_branches(searched):
     ends = {"formula": lambda level, twin: 3.0 if twin % 3 else 4.0, "events": True}
-    answer = searched(job(0.01), moved=0.1, **ends)
+    answer = searched(asked(0.01), moved=0.1, **ends)
     assert answer.branches and not answer.reached
     assert [round(one.value, 9) for one in answer.branches] == [3.0, 4.0]
     assert answer.value == 3.0
@@ -279,13 +287,13 @@ def test_a_finer_run_that_diverges_leaves_the_best_answer(searched):
     def formula(level, twin):
         return None if level > 1 else power(1.0)(level, twin)
 
-    answer = searched(job(1e-3), formula, events=True)
+    answer = searched(asked(1e-3), formula, events=True)
     assert not answer.reached
     assert answer.value == power(1.0)(1, 0) and answer.error == pytest.approx(0.15)
 
 
 @pytest.mark.parametrize("budget", [4.0, 30.0])
 def test_a_budget_is_kept_and_what_is_missing_is_said(searched, budget):
-    answer = searched(job(1e-5), power(1.0), events=True, budget=budget)
+    answer = searched(asked(1e-5), power(1.0), events=True, budget=budget)
     assert answer.plan.seconds <= budget and not answer.reached
     assert "budget" in answer.shortfall and abs(answer.value - 3.0) <= answer.error

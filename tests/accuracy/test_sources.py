@@ -9,12 +9,14 @@ import pytest
 from cases.meshes import with_moved_nodes
 from taichi_dem import CONCRETE, InputError, Scene, effects, goals, solve
 from taichi_dem.accuracy import sources
-from taichi_dem.accuracy.runs import Job
+from taichi_dem.accuracy.levels import Levels
+from taichi_dem.accuracy.runs import Runs
 from taichi_dem.accuracy.sources import Beside, finer_law, with_contact
 from taichi_dem.effects import BodyContact, SphereContact
 from taichi_dem.kit.bars.answer import Answer, Branch, ErrorParts, Plan, branched, with_source
 from taichi_dem.kit.bars.budget import Source
 from taichi_dem.kit.bars.chance import t_quantile
+from taichi_dem.kit.bars.runs import Question
 from taichi_dem.mesh.shapes import bar
 from tests.scenes import UNTIL, struck_bar
 
@@ -31,29 +33,38 @@ def touching(law=None, word=None):
 
 
 @pytest.fixture
-def found(monkeypatch):
+def found():
     """Sources by name of a question whose runs have the values of a formula of their scene."""
 
     def sources_of(
-        scene, formula, asked=("step",), meshes=(), pairs=1, certificate=None, budget=9, **given
+        scene,
+        formula,
+        asked=("step",),
+        meshes=(),
+        pairs=1,
+        certificate=None,
+        budget=9,
+        events=False,
     ):
-        class Runs:
-            seconds, listen, cost = 2.0, None, {0: 1.0}
-
-            def __init__(self, job, listen=None):
-                self.job = job
+        class Made(Runs):
+            seconds, cost = 2.0, None
 
             def value(self, level):
-                return formula(self.job.scene)
+                return formula(self.levels.scene)
+
+            def eventful(self, level):
+                return events
 
             def release(self):
                 """Nothing is held."""
 
-        monkeypatch.setattr(sources, "Runs", Runs)
-        job = Job(scene, UNTIL, goals.kinetic_energy(), 0.01, 0.95, asked, tuple(meshes))
+        goal = goals.kinetic_energy()
+        asked_about = Question((goal,), sources=asked)
+        runs = Made(Levels(scene, UNTIL, goal), None, asked_about, meshes)
+        runs.cost = {0: 1.0}
         report = SimpleNamespace(pair_evaluations=pairs, certificate=certificate)
-        beside = Beside(job, Runs(job), 0, report, lambda runs: runs <= budget, **given)
-        return {one.name: one for one in beside.sources()}
+        beside = Beside(runs, 0, report, lambda runs: runs <= budget)
+        return {one.name: one for one in beside.sources(0)}
 
     return sources_of
 
@@ -153,10 +164,10 @@ def test_what_is_reached_is_as_narrow_as_asked_with_all_sources(value):
 @pytest.mark.parametrize("events", [False, True])
 def test_a_mesh_that_is_not_measured_has_the_error_that_half_of_all_questions_exceed(found, events):
     """More where something breaks, and none of its own where it is measured."""
-    plain = found(touching(), lambda scene: -3.0, eventful=events)["mesh"]
+    plain = found(touching(), lambda scene: -3.0, events=events)["mesh"]
     assert plain.common == pytest.approx(3.0 * sources.COMMON[events])
     assert sources.COMMON[False] < sources.COMMON[True]
-    asked = found(touching(), _length, ("step", "mesh"), [BAR, BAR], eventful=events)["mesh"]
+    asked = found(touching(), _length, ("step", "mesh"), [BAR, BAR], events=events)["mesh"]
     assert asked.common == 0.0
 
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from ca_damper import Automaton, Goal, Oscillator, goals
-from ca_damper.accuracy.estimate import SeedValues, estimate
-from ca_damper.accuracy.job import Job
-from ca_damper.accuracy.search import Search
+from ca_damper import Automaton, Oscillator, goals
+from ca_damper.accuracy.steady_motions import SteadyMotions
 from ca_damper.report.measures import MEASURE_UNITS
+from taichi_dem.kit.bars.runs import Question
+from taichi_dem.kit.bars.search import Search
 
 
 class DrawnRuns:
@@ -31,6 +31,12 @@ class DrawnRuns:
     def cycles(self, key):
         return len(self.records.get(key, ()))
 
+    def longest(self):
+        return max(map(len, self.records.values()))
+
+    def seconds(self, cycles):
+        return 0.0
+
     def steps_per_cycle(self, ratio, dt):
         return 100
 
@@ -41,13 +47,8 @@ class DrawnRuns:
             more = np.array([draw() for _ in range(count)])
             self.records[key] = np.concatenate([before, more])
 
-    def measures(self, key, begin, leave_out=0):
-        kept = self.records[key][begin:]
-        if not leave_out:
-            return dict.fromkeys(MEASURE_UNITS, kept[None].mean(axis=1))
-        parts = kept[len(kept) % leave_out :].reshape(leave_out, -1)
-        others = (parts.sum() - parts.sum(axis=1)) / (parts.size - parts.shape[1])
-        return dict.fromkeys(MEASURE_UNITS, others)
+    def measures(self, key, begin):
+        return dict.fromkeys(MEASURE_UNITS, self.records[key][begin:][None].mean(axis=1))
 
     def by_cycle(self, key):
         return dict.fromkeys(MEASURE_UNITS, self.records[key])
@@ -80,10 +81,10 @@ def two_motions(fall, rise, low=0.7, noise=0.02):
 
 def asked(make, seed, tolerance):
     """(value, half-width, whether branched) of rms at f0, of drawn runs."""
-    job = Job(Automaton(), 10, Oscillator(), (goals.rms_at(1.0),), tolerance)
-    (found,) = Search(job, DrawnRuns(make, np.random.default_rng(seed)), 2e-4).run()
-    is_branched = len(found.clusters(tolerance)) > 1
-    return float(found.value[0]), float(found.parts.total[0]), is_branched
+    runs = DrawnRuns(make, np.random.default_rng(seed))
+    question = Question((goals.rms_at(1.0),), tolerance)
+    (found,) = Search(question, SteadyMotions(question, runs)).answers()
+    return found.value, found.error, bool(found.branches)
 
 
 def share_held(make, mean, count, tolerance):
@@ -110,52 +111,3 @@ def test_nearly_all_bars_hold(case):
     held, told = share_held(make, mean, COUNT, tolerance)
     assert told >= COUNT // 2
     assert held >= 0.95 * told - 3.0 * math.sqrt(0.95 * 0.05 * told)
-
-
-GOAL = Goal("any", "m", lambda found: found.rms[0, 0], "extreme")
-NOTHING = np.zeros(1)
-
-
-def values_of(rng, seeds, between, within, mean=1.0):
-    """A value of each seed; its variance by sampling known from 7 degrees of freedom a seed."""
-    made = mean + between * rng.normal(size=(seeds, 1)) + within * rng.normal(size=(seeds, 1))
-    freedom = 7 * seeds
-    variance = np.array([within**2 * rng.chisquare(freedom) / freedom])
-    return SeedValues(made, variance, freedom, NOTHING)
-
-
-@pytest.mark.parametrize(
-    ("between", "within", "seeds"), [(0.0, 0.01, 3), (0.02, 0.001, 3), (0.0, 0.0, 3)]
-)
-def test_a_bar_of_seeds_and_sampling_holds_the_mean(between, within, seeds):
-    """400 cases: 95 % is 380 with a standard deviation of 4.4."""
-    rng, held = np.random.default_rng(5), 0
-    for _ in range(400):
-        found = values_of(rng, seeds, between, within)
-        sampling, chance = found.bars(0.95)
-        held += bool(abs(found.mean[0] - 1.0) <= np.hypot(sampling, chance)[0] + 1e-12)
-    assert 366 <= held <= 400
-
-
-def test_a_bar_holds_the_limit_where_the_step_s_error_is_like_that_of_chance():
-    """1200 cases, standard deviation 0.6 %; squares of both parts alone would hold it in 89 %."""
-    rng, sigma, steps = np.random.default_rng(4), 0.01, (1.0, 2.0, 4.0)
-    held = []
-    for shift in (0.0, 0.5, 1.0, 2.0, 5.0, 10.0):
-        for _ in range(200):
-            means = 1.0 + sigma * (shift * np.array(steps) + rng.normal(size=3))
-            one = np.array([sigma**2])
-            levels = [SeedValues(np.array([[mean]]), one, 200, NOTHING) for mean in means]
-            found = estimate(GOAL, steps, levels, NOTHING, 0.95)
-            held.append(bool(abs(found.value[0] - 1.0) <= found.parts.total[0]))
-    assert 0.93 <= np.mean(held) <= 0.97
-
-
-@pytest.mark.parametrize("steps", [(1.0, 2.0), (1.0, 2.0, 4.0)])
-def test_two_steps_support_no_bar_below_a_third_of_the_tolerance(steps):
-    """Three that agree do: their error is that of their changes, of first order."""
-    levels = [SeedValues(np.array([[2.0 + 1e-6 * k]]), np.zeros(1), 200, NOTHING) for k in steps]
-    found = estimate(GOAL, steps, levels, NOTHING, 0.95, tolerance=0.03)
-    third = 0.03 * found.value[0] / 3.0
-    assert found.parts.step[0] == pytest.approx(third if len(steps) == 2 else 1.25e-6)
-    assert found.parts.total[0] <= found.allowed(0.03)

@@ -16,7 +16,6 @@ from ca_damper import (
     goals,
     solve_response,
 )
-from ca_damper.accuracy.estimate import SeedValues, estimate
 from ca_damper.accuracy.runs import SceneKey, SceneRuns
 from ca_damper.report.peak_search import PeakSearch
 from tests.damper import paper
@@ -45,14 +44,11 @@ def test_a_light_container_peaks_where_it_must():
         assert answer.value == pytest.approx(wanted, rel=0.01)
 
 
-@pytest.mark.parametrize("noise", [0.0, 3e-15])
-def test_a_quantity_that_is_zero_has_the_bar_of_its_noise(noise):
-    """Beside 1e-12 of the unit, which rounding is at most: values of noise come to twice of it."""
-    freedom, none = 8, np.zeros(1)
-    levels = [SeedValues(np.full((1, 1), noise * k), none, freedom, none) for k in (1.0, -2.0, 1.5)]
-    found = estimate(goals.loss_factor_at(1.0), (1.0, 2.0, 4.0), levels, none, 0.95, 1e-12)
-    total = float(found.parts.total[0])
-    assert 2.0 * noise <= total <= 20.0 * noise and found.shortfall(0.01, "") == ""
+def test_a_quantity_that_is_zero_has_the_bar_of_its_noise():
+    """Of a mass that loses nothing: reached, by less than 1e-12, which rounding is at most."""
+    goal = goals.loss_factor_at(1.0)
+    answer = solve_response(RigidMass(), particles=30, goal=goal, **QUIET)
+    assert answer.reached and abs(answer.value) <= answer.error < 1e-14
 
 
 @pytest.mark.parametrize(
@@ -100,7 +96,7 @@ def test_the_same_question_has_the_same_bits_whatever_budget_is_left():
 def test_a_budget_that_runs_out_gives_the_best_answer_and_says_what_is_missing():
     most = grains(0.0005, budget_s=1.5)
     assert not most.reached and most.error > 0.0005 * most.value
-    assert "0.05 % was not reached within budget_s of 1.5 s" in str(most)
+    assert "the budget is spent" in str(most)
     assert most.value == pytest.approx(grains().value, rel=0.05)
     assert most.plan.seconds <= 1.5 * 1.3
 

@@ -1,7 +1,7 @@
 """Question with a tolerance, and its answer: value, error bar and cost."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import reduce
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -17,8 +17,6 @@ from taichi_dem.kit.validation import choice, shown, word
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Tolerances of which an answer tells the cost.
-TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 #: A number, or one for each place of a curve.
 Values = float | np.ndarray
 
@@ -344,26 +342,20 @@ def branched(
 
 
 def branches_of(
-    values: np.ndarray, clusters: Sequence[np.ndarray], seeds: Sequence[int], error: float, t: float
+    values: np.ndarray, clusters: Sequence[np.ndarray], seeds: Sequence[int], half: float
 ) -> tuple[Branch, ...]:
-    """Branches of clusters; error: standard error of a value by sampling, t: its quantile."""
-    return tuple(_branch(values[part], part, seeds, error, t) for part in clusters)
+    """Branches of clusters of values; half: half-width of the bar of one value."""
+    return tuple(_branch(values[part], part, seeds, half) for part in clusters)
 
 
-def _branch(values, part, seeds, error, t):
+def _branch(values, part, seeds, half):
     count = len(part)
-    half = t * error / math.sqrt(count)
+    half = half / math.sqrt(count)
     mean, deviation = mean_and_deviation(values)
     if count > 1:
         half = max(half, t_quantile(0.95, count - 1) * deviation / math.sqrt(count))
     named = tuple(seeds[k] for k in sorted(part.tolist()))
     return Branch(mean, half, count / len(seeds), share_error(count, len(seeds)), named)
-
-
-def cost_curve(tolerance: float, cost: Callable[[float], tuple[float, bool]]) -> Iterator[Expense]:
-    """Costs of common tolerances and the one asked for; cost: CPU time [s], whether spent."""
-    for one in sorted({*TOLERANCES, tolerance}, reverse=True):
-        yield Expense(one, *cost(one))
 
 
 def largest(values: Values) -> float:
