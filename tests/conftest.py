@@ -98,7 +98,7 @@ damper_engine._POOL.least = (64, 128, 4096, 512, 4096, *(256,) * 32)
 
 #: Bytes of the process beyond which the next file begins with another session, if that of before
 #: has taken a good part of them.
-_MOST_BYTES, _LEAST_GROWTH = 1.5e9, 0.25e9
+_MOST_BYTES, _LEAST_GROWTH = 1.9e9, 0.25e9
 _MOST_TREES = 300
 _at_start = {}
 

@@ -196,23 +196,29 @@ class Container:
         return self.load_of(first)
 
     @ti.func
+    def by_filling(self, s):
+        """Force of the filling of a scene, with the weight of what moves with it [N]."""
+        heavy = self.carried[s]
+        if ti.static(self.lifts):
+            # On a spring the weight of the container itself is in x = 0.
+            heavy += self.mass[s][0]
+        return self.impulse[s] / self.table.dt[s] - heavy * self.table.gravity[s]
+
+    @ti.func
     def load_of(self, first):
         """Load over the step; that of a single mode is per mass of all it moves."""
-        per_mass, dt = 1.0, self.table.dt[first]
+        per_mass = 1.0
         if ti.static(not self.is_group):
             per_mass = 1.0 / self._mass(first)
         constant, lag = ti.Vector.zero(ti.f64, self.modes), ti.Vector.zero(ti.f64, self.modes)
         for k in range(self.boxes()):
             s = first + k
-            heavy, shape = self.carried[s], self.shape[s]
-            lag += heavy * self.residual[s] * shape
-            if ti.static(self.lifts):
-                # On a spring the weight of the container itself is in x = 0.
-                heavy += self.mass[s][0]
-            constant += (self.impulse[s] / dt - heavy * self.table.gravity[s]) * shape
+            constant += self.by_filling(s) * self.shape[s]
+            if ti.static(self.is_group):
+                lag += self.carried[s] * self.residual[s] * self.shape[s]
         return self.Load(
             scene=first,
-            start=self.elapsed[first] * dt,
+            start=self.elapsed[first] * self.table.dt[first],
             stiffness=self.stiffness[first] * per_mass,
             damping=self.damping[first] * per_mass,
             share=self.share[first],

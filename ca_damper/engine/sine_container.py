@@ -49,13 +49,18 @@ class SineContainer(Container):
     @ti.func
     def acting(self, s):
         """(K + i w C) y0 is turned by the present phase."""
-        load, circle, y0 = self.load_of(s), self.clock.circle[s], self.table.base_amplitude[s]
+        circle, y0, per_mass = (
+            self.clock.circle[s],
+            self.table.base_amplitude[s],
+            1.0 / self._mass(s),
+        )
+        stiffness, damping = self.stiffness[s][0] * per_mass, self.damping[s][0] * per_mass
         omega = 2.0 * ti.math.pi * self.table.frequency[s]
-        by_spring, by_dashpot = load.stiffness[0] * y0, load.damping[0] * omega * y0
+        by_spring, by_dashpot = stiffness * y0, damping * omega * y0
         return Turning(
-            stiffness=load.stiffness[0],
-            damping=load.damping[0],
-            constant=load.constant[0],
+            stiffness=stiffness,
+            damping=damping,
+            constant=self.by_filling(s) * per_mass,
             omega=omega,
             drive=by_spring * circle[0] + by_dashpot * circle[1],
             quadrature=by_spring * circle[1] - by_dashpot * circle[0],
