@@ -58,7 +58,7 @@ class BodyGeometry(Geometry):
     """
 
     by_face = False
-    at_start = 0.5, 0.5, 100.0
+    at_start = 0.5, 0.5, 110.0
     constant_fields = (
         *("corner", "outward", "plane", "incentre", "volume", "face_area", "far"),
         *("ends", "end_count", "least_weight"),
