@@ -144,6 +144,7 @@ class Simulation:
         return self.engine.values(field)
 
     def _load(self):
+        self.cut_short = ""
         with self._undivided("its scene was loaded"):
             self._load_engine()
             if self.scene.initial_motion:
@@ -159,9 +160,9 @@ class Simulation:
     @contextlib.contextmanager
     def _undivided(self, what: str) -> Iterator[None]:
         """In its block an exception leaves a simulation that can only be reset."""
-        self.cut_short = what
+        before, self.cut_short = self.cut_short, what
         yield
-        self.cut_short = ""
+        self.cut_short = before
 
     def reset(self, scene: Scene | None = None, method: Method | None = None) -> None:
         """Begin again at time zero as the scene says, optionally with another scene or method.
@@ -291,8 +292,7 @@ class Simulation:
                 self.followed.divergence_check.check(hurried=bool(values(self.state.tick) < end))
                 if on_call is not None:
                     on_call()
-            with self._undivided("its contact lists grew"):
-                self._find_room()
+            self._find_room()
 
     @contextlib.contextmanager
     def _timed(self):
@@ -310,7 +310,8 @@ class Simulation:
             started = time.perf_counter()
             self.broad_phase.ask_again()
             self.make_room((0, 0, *(n + n // 8 for n in lacking)))
-            self.driver.prepare()
+            with self._undivided("its contact lists grew"):
+                self.driver.prepare()
             self.compile_seconds += time.perf_counter() - started
 
     def make_room(self, room: Sequence[int]) -> None:
@@ -320,15 +321,18 @@ class Simulation:
         if wanted == [*old.capacity]:
             return
         compiling("longer contact lists", 3, PARTS)
-        arrays, name = FieldMemory(old).read(), self.driver.name
-        self._engine = ENGINES.borrow(old.structure, wanted, self.model, self)
-        self._load_engine()
-        FieldMemory(self._engine).write(arrays)
-        self.driver = self._engine.drivers[name]
-        self.driver.follow(old.drivers[name])
-        if self._followed is not None:
-            vars(self._followed.run).update(vars(self.parts))
-        ENGINES.free(old)
+        # Without memory for it, the run stays as it is.
+        larger = ENGINES.borrow(old.structure, wanted, self.model, self)
+        with self._undivided("its contact lists grew"):
+            arrays, name = FieldMemory(old).read(), self.driver.name
+            self._engine = larger
+            self._load_engine()
+            FieldMemory(larger).write(arrays)
+            self.driver = larger.drivers[name]
+            self.driver.follow(old.drivers[name])
+            if self._followed is not None:
+                vars(self._followed.run).update(vars(self.parts))
+            ENGINES.free(old)
 
     @property
     def searches(self) -> int:

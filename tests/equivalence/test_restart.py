@@ -17,7 +17,7 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.engine import ENGINES, BlastEngine
-from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.allocation import CapacityError, assign
 from taichi_dem.kit.checkpoint import read_checkpoint, write_checkpoint
 from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.laws.contact_contracts import Geometry
@@ -227,10 +227,15 @@ def test_every_array_of_a_checkpoint_must_be_there_and_like_its_own(light, tmp_p
 SHORT = {"pairs": (4, 2**16, 2**16), "neighbours": (2**14, 2**16, 16)}
 
 
+def refused(*_):
+    """No memory."""
+    raise CapacityError("full")
+
+
 @pytest.mark.parametrize("case", ["controlled"], indirect=True)
 @pytest.mark.parametrize("lists", ["pairs", pytest.param("neighbours", marks=pytest.mark.slow)])
 def test_lists_that_grow_give_the_bits_of_long_ones(case, run, straight, lists, monkeypatch):
-    """A search that finds no room is made again, in an engine with more."""
+    """A search that finds no room is made again, in an engine with more, when there is memory."""
     # The other run's engine is the one with more room.
     run.simulation._engine.owner = None
     with monkeypatch.context() as short:
@@ -240,6 +245,10 @@ def test_lists_that_grow_give_the_bits_of_long_ones(case, run, straight, lists, 
         simulation = Simulation(bar_scene(kind=case[0]), case[1])
     assert simulation.engine.capacity[2:] == SHORT[lists]
     grown = Run(*case, simulation)
+    if lists == "pairs":
+        with monkeypatch.context() as poor, pytest.raises(CapacityError):
+            poor.setattr(ENGINES, "borrow", refused)
+            grown.go_half()
     grown.go_half()
     end = grown.finish()
     assert simulation.engine.capacity == LEAST
