@@ -140,6 +140,7 @@ class BroadPhase:
             # Pairs that are near get a slot, others lose theirs.
             (light, self._count_row),
             *self.near_pairs.numbering.phases,
+            (bodies, self.near_pairs.place_row),
             (light, self._release),
             (free, self._update_pairs),
             (Once(), self._end_pairs),
@@ -234,7 +235,6 @@ class BroadPhase:
     @ti.func
     def _end_free(self, total):
         self.free_count[None] = total[0]
-        self.full[None] = 0
 
     @ti.func
     def _choose(self, a):

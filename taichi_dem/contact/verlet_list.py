@@ -244,7 +244,7 @@ class VerletList:
 class NearPairs:
     """Sorts the pairs of a ``PairStore`` that are near or have an impulse pending."""
 
-    scratch_fields = ("row_is_new", "wanted", "total")
+    scratch_fields = ("row_is_new", "wanted", "total", "begin")
 
     def __init__(self, contacts: Contacts, neighbours: VerletList):
         self.tables, self.contacts, self.store = contacts.tables, contacts, contacts.store
@@ -252,7 +252,7 @@ class NearPairs:
         n = self.tables.capacity.bodies
         self.row = ti.field(ti.i32, shape=neighbours.capacity)
         self.row_count, self.row_spheres = (ti.field(ti.i32, shape=n) for _ in range(2))
-        self.row_is_new = ti.field(ti.i32, shape=n)
+        self.row_is_new, self.begin = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.wanted = ti.Vector.field(3, ti.i32, shape=n)
         self.total = ti.Vector.field(3, ti.i32, shape=())
         self.lacking = ti.Vector.field(2, ti.i32, shape=())
@@ -308,22 +308,27 @@ class NearPairs:
 
     @ti.func
     def _begin_row(self, i, before, value):
-        if self.neighbours.lacking[None] == 0:
-            self.store.first_of[i] = before[0]
+        self.begin[i] = before[0]
         self.wanted[i] = ivec3(before[2], before[3], before[4])
 
     @ti.func
     def _end_rows(self, total):
-        """Take over the numbers of all; find whether there is room for them."""
+        """Find whether there is room for all, and take over their numbers."""
         slots, places = self.store.slots_with(total[2], total[4]), self.store.places_with(total[3])
         self.lacking[None] = [0, 0]
         self.full[None] = ti.cast(self.neighbours.lacking[None] > 0, ti.i32)
+        if slots > self.store.slots or places > self.store.spheres:
+            self.lacking[None], self.full[None] = [slots, places], 1
         if self.full[None] == 0:
             self.store.first_of[self.tables.body_count[None]] = total[0]
             self.store.near_count[None], self.store.sphere_count[None] = total[0], total[1]
             self.total[None] = ivec3(total[2], total[3], total[4])
-            if slots > self.store.slots or places > self.store.spheres:
-                self.lacking[None], self.full[None] = [slots, places], 1
+
+    @ti.func
+    def place_row(self, i):
+        """Take over where the pairs of body i begin, when there is room."""
+        if self.full[None] == 0:
+            self.store.first_of[i] = self.begin[i]
 
     @ti.func
     def release(self, i):
@@ -364,15 +369,10 @@ class NearPairs:
 
     @ti.func
     def end(self):
-        """Take over what rows have taken and freed; list nothing when there is no room."""
+        """Take over what rows have taken and freed."""
         if self.full[None] == 0:
             total = self.total[None]
             self.store.take(total[0], total[1], total[2])
-        elif self.neighbours.lacking[None] == 0:
-            # Rows hold the slots of all pairs; where rows lack room, the lists of before do.
-            self.store.near_count[None] = 0
-            for i in range(self.tables.body_count[None] + 1):
-                self.store.first_of[i] = 0
 
     @ti.func
     def put_row(self, i):
