@@ -10,7 +10,7 @@ import taichi as ti
 from taichi_dem.kit.products import dot, norm, squared
 from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.laws.base import NEAR
-from taichi_dem.laws.contracts import BondLaw
+from taichi_dem.laws.damage import DamageLaw
 from taichi_dem.materials import Material
 from taichi_dem.state.tables import Capacity
 
@@ -23,7 +23,7 @@ _LEAST_SPENT = 1.0 + 2.0**-20
 
 
 @ti.data_oriented
-class CohesiveCrack(BondLaw):
+class CohesiveCrack(DamageLaw):
     """Bonds of rock and concrete: a crack spends G_f per area of its plane, not of its faces.
 
     Replaces ``Softening`` and ``ShearSlip``.
@@ -158,11 +158,6 @@ class CohesiveCrack(BondLaw):
         return ti.cast(whole > 1, ti.i32)
 
     @ti.func
-    def acted(self, m, u, stiffness):
-        """1 for a damaged unit, else 0."""
-        return ti.cast(self.unit[u][0] > 0.0, ti.i32)
-
-    @ti.func
     def stored(self, m, u, stiffness, jump):
         """Elastic energy per area of opening and of sliding [J/m^2]."""
         unit, sliding = self.unit[u], vec2(jump[1], jump[2])
@@ -173,16 +168,6 @@ class CohesiveCrack(BondLaw):
             normal *= left
             rubbing *= 0.0
         return normal, 0.5 * stiffness[1] * (left * squared(sliding) + rubbing)
-
-    @ti.func
-    def spent(self, m, u, stiffness):
-        """Energy per area [J/m^2] that damage has spent in the unit."""
-        return self.unit[u][1]
-
-    @ti.func
-    def damage(self, m, u, stiffness):
-        """0 intact to 1 failed."""
-        return self.unit[u][0]
 
     @ti.func
     def residual_slip(self, m, u):

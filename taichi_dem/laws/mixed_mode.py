@@ -7,7 +7,7 @@ from taichi_dem.kit.products import squared
 from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.kit.validation import positive, shown
 from taichi_dem.laws.base import NEAR, check_sliding_energy
-from taichi_dem.laws.contracts import BondLaw
+from taichi_dem.laws.damage import DamageLaw
 from taichi_dem.materials import Material
 from taichi_dem.state.tables import Capacity
 
@@ -17,7 +17,7 @@ _MOST, _QUARTER = 8.0, 0.25
 
 
 @ti.data_oriented
-class MixedMode(BondLaw):
+class MixedMode(DamageLaw):
     """Bonds soften along a straight line, by opening and sliding together, and fail.
 
     Replaces ``Softening`` and ``ShearSlip``.
@@ -123,11 +123,6 @@ class MixedMode(BondLaw):
         return ti.cast(self.unit[u][0] >= 1.0, ti.i32)
 
     @ti.func
-    def acted(self, m, u, stiffness):
-        """1 for a damaged unit, else 0."""
-        return ti.cast(self.unit[u][0] > 0.0, ti.i32)
-
-    @ti.func
     def stored(self, m, u, stiffness, jump):
         """Elastic energy per area of opening and of sliding [J/m^2]."""
         left = 1.0 - self.unit[u][0]
@@ -135,16 +130,6 @@ class MixedMode(BondLaw):
         if jump[0] > 0.0:
             normal *= left
         return normal, 0.5 * left * stiffness[1] * squared(vec2(jump[1], jump[2]))
-
-    @ti.func
-    def spent(self, m, u, stiffness):
-        """Energy per area [J/m^2] that damage has spent in the unit."""
-        return self.unit[u][1]
-
-    @ti.func
-    def damage(self, m, u, stiffness):
-        """0 intact to 1 failed."""
-        return self.unit[u][0]
 
 
 @ti.func
