@@ -63,31 +63,18 @@ def gathered_numbers(field: ti.template(), members):
 
 
 @ti.func
-def gathered_product(field: ti.template(), members, vectors):
-    """Products of the 3x3 matrix at each lane's member with the lane's vector."""
+def gathered_product(field: ti.template(), members, vectors, turned: ti.template()):
+    """Products of the 3x3 matrix at each lane's member, or of its transpose, with its vector."""
     made = lane_vectors(0.0)
     for n in ti.static(range(LANES)):
         entry = field[members[n]]
+        if ti.static(turned):
+            entry = entry.transpose()
         for r in ti.static(range(3)):
             made[r, n] = (
                 entry[r, 0] * vectors[0, n]
                 + entry[r, 1] * vectors[1, n]
                 + entry[r, 2] * vectors[2, n]
-            )
-    return made
-
-
-@ti.func
-def gathered_transposed_product(field: ti.template(), members, vectors):
-    """The same with the transposed matrices."""
-    made = lane_vectors(0.0)
-    for n in ti.static(range(LANES)):
-        entry = field[members[n]]
-        for r in ti.static(range(3)):
-            made[r, n] = (
-                entry[0, r] * vectors[0, n]
-                + entry[1, r] * vectors[1, n]
-                + entry[2, r] * vectors[2, n]
             )
     return made
 

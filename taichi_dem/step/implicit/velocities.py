@@ -8,7 +8,6 @@ from taichi_dem.kit.lanes import (
     gathered,
     gathered_numbers,
     gathered_product,
-    gathered_transposed_product,
     row_of,
     scaled,
 )
@@ -99,13 +98,13 @@ class Velocities:
     def pushed_lanes(self, i, linear, angular, force, moment):
         """Velocity and spin of the body of each lane after an impulse and a moment."""
         if ti.static(self.has_supports):
-            linear += gathered_product(self.hold, i, force)
+            linear += gathered_product(self.hold, i, force, False)
         else:
             linear += scaled(gathered_numbers(self.lightness, i), force)
-        angular += gathered_product(self.turn, i, moment)
+        angular += gathered_product(self.turn, i, moment, False)
         if ti.static(self.couples):
-            linear += gathered_product(self.coupling, i, moment)
-            angular += gathered_transposed_product(self.coupling, i, force)
+            linear += gathered_product(self.coupling, i, moment, False)
+            angular += gathered_product(self.coupling, i, force, True)
         return linear, angular
 
     @ti.func
