@@ -29,8 +29,8 @@ from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import GREY, picture
 from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.materials.material import POISSON
+from taichi_dem.mesh.mesh import element_sizes
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.stability.step_report import element_sizes
 
 NAME = "calibrate_material"
 STRESS, ENERGY = study.number(0, 1e12), study.number(0, 1e9)

@@ -31,7 +31,7 @@ from taichi_dem.materials.material import (
     kept_energy,
     unchecked,
 )
-from taichi_dem.mesh.mesh import Mesh, volumes
+from taichi_dem.mesh.mesh import Mesh, element_sizes
 from taichi_dem.mesh.topology import topology_of
 
 #: Most different materials of a scene: tables on the device have a row for each ordered pair.
@@ -106,13 +106,13 @@ class BodyMaterials:
     @property
     def weakened(self) -> tuple[str, ...]:
         """A sentence for each material whose strength was lowered for large elements."""
-        own = [(self.materials[k], row[k]) for k, row in enumerate(self.pairs)]
+        own = [(self.materials[k], row[k], self.of_body == k) for k, row in enumerate(self.pairs)]
         return tuple(
             f"the tensile strength of {given.tensile_strength:.4g} Pa is lowered to "
             f"{one.tensile_strength:.3g} Pa, with which cracks through elements of up to "
-            f"{largest(self.mesh, self.of_body == k):.3g} m keep the fracture energy of "
+            f"{element_sizes(self.mesh)[bodies].max():.3g} m keep the fracture energy of "
             f"{given.fracture_energy:.4g} J/m2"
-            for k, (given, one) in enumerate(own)
+            for given, one, bodies in own
             if one.tensile_strength < given.tensile_strength
         )
 
@@ -188,17 +188,12 @@ class BodyMaterials:
     def _remedy(self, softest):
         """Size of elements, and their number, with which a bond reaches its strength, in words."""
         share = softest.failure_opening / softest.onset_opening / SPARE
-        size = share * largest(self.mesh, slice(None))
+        size = share * float(element_sizes(self.mesh).max())
         count = self.mesh.body_count / share**3
         return (
             f": elements of at most {size:.2g} m would do, about {count:.2g} of them, or coarse="
             "'weaken' of Material.from_elastic, which lowers the strength"
         )
-
-
-def largest(mesh: Mesh, bodies: Any) -> float:
-    """Longest edge [m] of regular tetrahedra with the volumes of some bodies."""
-    return float(np.cbrt(6.0 * np.sqrt(2.0) * volumes(mesh)[bodies].max()))
 
 
 #: One material for all bodies, or those of each.

@@ -237,6 +237,11 @@ def volumes(mesh: Mesh) -> np.ndarray:
     return geometry.signed_volumes(mesh.points, mesh.tetrahedra)
 
 
+def element_sizes(mesh: Mesh) -> np.ndarray:
+    """Edge of the regular tetrahedron of the volume of each body [m], (body_count,)."""
+    return np.cbrt(6.0 * np.sqrt(2.0) * volumes(mesh))
+
+
 def checked_mesh(
     points: ArrayLike,
     tetrahedra: ArrayLike,

@@ -20,7 +20,7 @@ from taichi_dem.materials.body_materials import AnyMaterial, BodyMaterials
 from taichi_dem.materials.bond_rules import ModulusOverDistance
 from taichi_dem.materials.material import elastic_constants
 from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.mesh import Mesh, volumes
+from taichi_dem.mesh.mesh import Mesh, element_sizes
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.scene import Scene, scene_warnings
 from taichi_dem.stability.body_limits import LIMITED, dashpot_step, spring_step
@@ -292,11 +292,6 @@ def elastic_report(scene: Scene) -> ElasticReport:
     pairs = zip(alone, laid.materials)
     lengths = [own.young * one.fracture_energy / one.tensile_strength**2 for own, one in pairs]
     return ElasticReport(stiffness, asked, np.array(lengths)[laid.of_body], sizes, steps)
-
-
-def element_sizes(mesh: Mesh) -> np.ndarray:
-    """Edge of the regular tetrahedron of the volume of each body [m], (body_count,)."""
-    return np.cbrt(6.0 * np.sqrt(2.0) * volumes(mesh))
 
 
 def _asked(material: Material) -> tuple[float, float] | None:
