@@ -123,6 +123,8 @@ class Scene(Pictured):
     initial_motion: ClassVar[Mapping[str, np.ndarray]] = {}
     #: Not among the options: the material of each body.
     body_materials: ClassVar[BodyMaterials]
+    #: Strength of each bond over that of its material, (bond_count,); None where all have 1.
+    bond_strength: ClassVar[np.ndarray | None]
 
     def __post_init__(self):
         instance("mesh", self.mesh, Mesh)
@@ -141,8 +143,8 @@ class Scene(Pictured):
         object.__setattr__(self, "sleep", _sleep_of(self))
         _check_roles(self.effects)
         whole("seed", self.seed, 0, 2**31 - 1)
-        factor = bond_strength(laid, self.strength, self.seed)
-        for material in strongest(laid.checked_pairs(), factor):
+        object.__setattr__(self, "bond_strength", bond_strength(laid, self.strength, self.seed))
+        for material in strongest(laid.checked_pairs(), self.bond_strength):
             for effect in self.effects:
                 effect.check_material(material)
         for effect in self.effects:
@@ -174,8 +176,7 @@ class Scene(Pictured):
     def model(self) -> Model:
         """Return the scene as arrays of bodies, bonds and effects."""
         stress = None if self.stress is None else tensor_of(self.stress)
-        factor = bond_strength(self.body_materials, self.strength, self.seed)
-        return Model(self.mesh, self.body_materials, self.effects, stress, factor)
+        return Model(self.mesh, self.body_materials, self.effects, stress, self.bond_strength)
 
     @property
     def on_demand(self) -> bool:
