@@ -17,12 +17,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from cases.trust.plates import material_of, plate, springs_step
-from taichi_dem import ImplicitDashpots, Scene, Simulation, effects
+from cases.trust.plates import comes_apart, material_of, notched, plate, pulled
+from taichi_dem import effects
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLUE, GREEN, RED, picture
 from taichi_dem.kit.progress_bar import ProgressBar
-from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.output.fracture import crack_areas
 
 NAME = "crack_energy"
@@ -61,32 +60,15 @@ TABLE = study.Table(
 def parted(law, elements, seed, speed):
     """Pull a plate on a random mesh apart. Subject of TABLE."""
     edge = CRACK_LENGTH / elements
-    whole = plate(LENGTH, WIDTH, edge, seed, in_rows=False)
-    middle = (0.5 * LENGTH, 0.0, 0.0)
-    mesh = with_cut(whole, "notch", middle, (1, 0, 0), lambda x: x[:, 1] < DEPTH)
+    mesh = notched(plate(LENGTH, WIDTH, edge, seed, in_rows=False), LENGTH, DEPTH)
     options = {"tensile_strength": STRENGTH, "fracture_energy": ENERGY, "density": 2450.0}
     more = {"friction_angle": 30.0, "cohesion": COHESION * STRENGTH, "damping_ratio": 0.1}
     material = material_of(mesh, YOUNG, 0.2, **options, **more)
-    drives = [
-        effects.PrescribedMotion(group, (way * speed, 0, 0), ramp=RAMP)
-        for group, way in (("left", -1), ("right", 1))
-    ]
-    laws = [*LAWS[law](), effects.BondDamping()]
-    scene = Scene(mesh, material, [*laws, *drives], unbonded=["notch"])
-    simulation = Simulation(scene, ImplicitDashpots(springs_step(scene)))
-    run_apart(simulation, FAR / speed)
+    simulation = pulled(mesh, material, [*LAWS[law](), effects.BondDamping()], speed, RAMP)
+    looks, step = range(1, round(FAR / speed / LOOK) + 1), simulation.method.dt0
+    comes_apart(simulation, (round(look * LOOK / step) for look in looks))
     made = {"law": law, "elements": elements, "seed": seed, "bodies": mesh.body_count}
     return SimpleNamespace(**made, **spent(simulation, edge))
-
-
-def run_apart(simulation, end):
-    """Advance until both ends of the plate are in different pieces, or to an end [s]."""
-    x, step = simulation.model.centre[:, 0], simulation.method.dt0
-    for look in range(1, round(end / LOOK) + 1):
-        simulation.advance_to(round(look * LOOK / step))
-        piece = simulation.model.pieces(simulation.state.broken())
-        if piece[x.argmin()] != piece[x.argmax()]:
-            break
 
 
 def spent(simulation, edge):

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cases.trust import Number
-from cases.trust.plates import material_of, plate, springs_step
-from taichi_dem import ImplicitDashpots, Scene, Simulation, effects, simulate
+from cases.trust.plates import comes_apart, material_of, notched, plate, pulled, springs_step
+from taichi_dem import ImplicitDashpots, Scene, effects, simulate
 from taichi_dem.kit.errors import InputError
 from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.output.fracture import crack_areas
@@ -57,25 +57,15 @@ def crack(effort):
 
 def divided(edge, seed):
     """What ``measured`` tells of a plate on a random mesh."""
-    mesh = plate(*SIZE, edge, seed)
-    mesh = with_cut(mesh, "notch", (0.5 * SIZE[0], 0, 0), (1, 0, 0), lambda x: x[:, 1] < DEPTH)
+    mesh = notched(plate(*SIZE, edge, seed), SIZE[0], DEPTH)
     options = {"density": DENSITY, "friction_angle": 30.0, **BONDS}
     material = material_of(mesh, YOUNG, POISSON, **options)
-    pull = [
-        effects.PrescribedMotion(group, (way * SPEED, 0, 0), ramp=RAMP)
-        for group, way in (("left", -1), ("right", 1))
-    ]
     laws = [effects.BondDamping(), effects.Softening()]
-    scene = Scene(mesh, material, [*laws, *pull], unbonded=["notch"])
-    simulation = Simulation(scene, ImplicitDashpots(springs_step(scene)))
+    simulation = pulled(mesh, material, laws, SPEED, RAMP)
     time_s = 0.5 * OPEN * material.failure_opening / SPEED + RAMP
     every = round(time_s / simulation.method.dt0 / LOOKS)
-    x = simulation.model.centre[:, 0]
-    for look in range(1, LOOKS + 1):
-        simulation.advance_to(look * every)
-        piece = simulation.model.pieces(simulation.state.broken())
-        if piece[x.argmin()] != piece[x.argmax()]:
-            return measured(simulation, edge)
+    if comes_apart(simulation, range(every, (LOOKS + 1) * every, every)):
+        return measured(simulation, edge)
     raise InputError(f"the plate of seed {seed} did not come apart at {OPEN:g} times its opening")
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from taichi_dem import step_report
+from taichi_dem import ImplicitDashpots, Scene, Simulation, effects, step_report
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.materials import Material
-from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.mesh import checked_mesh, with_cut
 
 #: Shift of inner points, as a share of their distance.
 JITTER = 0.25
@@ -98,6 +98,32 @@ def material_of(mesh, young, poisson, axes=(0, 1), **options):
     shown = mesh_stiffness(mesh, made).young_along[list(axes)]
     scale = young / float(np.mean(shown))
     return Material.from_elastic(young=scale * young, poisson=poisson, **options)
+
+
+def notched(whole, length, depth):
+    """A plate with a notch of a depth at half its length [m]."""
+    return with_cut(whole, "notch", (0.5 * length, 0, 0), (1, 0, 0), lambda x: x[:, 1] < depth)
+
+
+def pulled(mesh, material, laws, speed, ramp):
+    """Simulation of a notched plate whose ends move apart, at a speed [m/s] after a ramp [s]."""
+    drives = [
+        effects.PrescribedMotion(group, (way * speed, 0, 0), ramp=ramp)
+        for group, way in (("left", -1), ("right", 1))
+    ]
+    scene = Scene(mesh, material, [*laws, *drives], unbonded=["notch"])
+    return Simulation(scene, ImplicitDashpots(springs_step(scene)))
+
+
+def comes_apart(simulation, steps):
+    """Advance to numbers of steps until both ends are in different pieces; whether they are."""
+    x = simulation.model.centre[:, 0]
+    for step in steps:
+        simulation.advance_to(step)
+        piece = simulation.model.pieces(simulation.state.broken())
+        if piece[x.argmin()] != piece[x.argmax()]:
+            return True
+    return False
 
 
 def springs_step(scene):
