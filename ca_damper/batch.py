@@ -159,7 +159,7 @@ class Batch(LoadedScenes):
         self._tell_compiling("set-up", 1)
         engine = self.engine
         engine.clear()
-        engine.load(self.fillings, self.table, self.support, rtol, atol, self.excitation)
+        engine.upload(self.fillings, self.table, self.support, rtol, atol, self.excitation)
         self._load_pace()
         if backend.most_rounds():
             rounds = _ROUNDS_A_PLACE * max(engine.capacity[3:], default=1)

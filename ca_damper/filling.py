@@ -274,17 +274,17 @@ class Filling(Protocol):
 class DeviceFilling(Protocol):
     """A filling on the device, for all scenes of a table; data oriented.
 
-    Of its members ``load``, ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt``
-    may change between two steps, when a sweep goes on to its next frequency. It may have one
-    further member, in Python: ``first_steps(effects)``, the step in which each effect first acted
-    in each scene, infinite if never, as of ``recorder.EventCounts``.
+    Of its members ``upload``, ``uses`` and ``snapshot`` are Python, the others ti.funcs.
+    ``table.dt`` may change between two steps, when a sweep goes on to its next frequency. It may
+    have one further member, in Python: ``first_steps(effects)``, the step in which each effect
+    first acted in each scene, infinite if never, as of ``recorder.EventCounts``.
 
     A filling whose impacts depend on the recoil of the container splits ``advance``, so that boxes
     on one structure resolve their impacts together: ``find_blows(s, step, motion)`` returns Blows,
     and ``carry_out(s, step, motion, recoil)`` with a Recoil returns the Action.
     """
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Take over the numbers of the filling of each scene, all of the same structure."""
 
     def reset(self, s: int) -> None:

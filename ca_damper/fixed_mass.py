@@ -84,7 +84,7 @@ class FixedMass:
         self.table = table
         self.particle_mass, self.velocity = table.field(ti.f64), table.field(ti.f64)
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Take over the mass of a particle of each scene."""
         fillings.write(self.particle_mass, lambda one: one.particle_mass)
 

@@ -81,20 +81,20 @@ class BlastEngine(Engine):
         self.forces = Forces(self.readings)
         self.recording_compiled = False
 
-    def load(self, model: Model, method: Method, max_speed: float, sleep: float = 0.0) -> None:
+    def upload(self, model: Model, method: Method, max_speed: float, sleep: float = 0.0) -> None:
         """Take over a scene, at rest and at time zero; max_speed [m/s], sleep: see ``Scene``."""
         self.clear()
         self.lengths = self._lengths(model)
         for effect, given in self.tables.matched(model):
             effect.stand_for(given)
-        self.tables.load(model)
-        self.state.load(model, max_speed)
+        self.tables.upload(model)
+        self.state.upload(model, max_speed)
         if self.contacts is not None:
-            self.contacts.load(model, method)
-            self.broad_phase.load(model, method)
-        self.schedule.load(model, method, sleep)
+            self.contacts.upload(model, method)
+            self.broad_phase.upload(model, method)
+        self.schedule.upload(model, method, sleep)
         if self.step.solver is not None:
-            self.step.solver.load(model, method)
+            self.step.solver.upload(model, method)
 
     def _lengths(self, model):
         """Entries that a scene uses by those that a field has."""

@@ -94,7 +94,7 @@ class Simulation:
         name = driver_name(driver, self.model.bond_count)
         structure = Structure(scene.effects, method, scene.on_demand)
         self._engine = ENGINES.borrow(structure, capacity_of(self.model), self.model, self)
-        self._load()
+        self._upload()
         self.driver = self.engine.drivers[name]
         self.compile_seconds = time.perf_counter() - started
 
@@ -143,19 +143,19 @@ class Simulation:
         """
         return self.engine.values(field)
 
-    def _load(self):
+    def _upload(self):
         self.cut_short = ""
         with self._undivided("its scene was loaded"):
-            self._load_engine()
+            self._upload_engine()
             if self.scene.initial_motion:
                 self.state.set_motion(self.model.centre, **self.scene.initial_motion)
             self._followed: Any = None
             self.run_seconds = self.run_cpu_seconds = 0.0
             self.first_motion: dict[str, np.ndarray] = {}
 
-    def _load_engine(self):
+    def _upload_engine(self):
         numbers = self.scene.max_speed, self.scene.sleep or 0.0
-        self.engine.load(self.model, self.method, *numbers)
+        self.engine.upload(self.model, self.method, *numbers)
 
     @contextlib.contextmanager
     def _undivided(self, what: str) -> Iterator[None]:
@@ -180,7 +180,7 @@ class Simulation:
         model = self.model if same else scene.model()
         self._check_reset(scene, method, model)
         self.scene, self.method, self.model = scene, method, model
-        self._load()
+        self._upload()
 
     def _check_reset(self, scene, method, model):
         engine = self.engine
@@ -326,7 +326,7 @@ class Simulation:
         with self._undivided("its contact lists grew"):
             arrays, name = FieldMemory(old).read(), self.driver.name
             self._engine = larger
-            self._load_engine()
+            self._upload_engine()
             FieldMemory(larger).write(arrays)
             self.driver = larger.drivers[name]
             self.driver.follow(old.drivers[name])

@@ -93,8 +93,8 @@ class Displacement:
         self.power = power
         self.rate2 = ti.field(real, shape=MAX_LEVEL + 2)
 
-    def load(self, distance: float, dt0: float) -> None:
-        """Load a distance and the step of level 0 [s]."""
+    def upload(self, distance: float, dt0: float) -> None:
+        """Upload a distance and the step of level 0 [s]."""
         steps = dt0 / 2.0 ** np.arange(MAX_LEVEL + 1)
         assign(self.rate2, np.append((distance / steps**self.power) ** 2, np.inf))
 

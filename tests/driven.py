@@ -94,8 +94,8 @@ class Driven:
         size = (table.count, traced, *self.fillings.structure.sizes.values())
         self.engine = _POOL.borrow(_Structure(self.fillings), size, filling, self)
         self.engine.clear()
-        self.table.load(table)
-        self.device.load(self.fillings)
+        self.table.upload(table)
+        self.device.upload(self.fillings)
         self.engine.reset(traced)
 
     @property

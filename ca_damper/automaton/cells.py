@@ -151,7 +151,7 @@ class Placement(OnCells):
         if is_named:
             self.named = self.table.field(ti.i32, "cells")
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Take over the user's cells."""
         if self.is_named:
             fillings.write(self.named, _named_cells)

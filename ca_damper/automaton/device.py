@@ -67,11 +67,11 @@ class LatticeDevice:
         self.cells, self.resting = cells, resting
         self.placement = Placement(cells, way, automaton.start is not None)
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Take over the numbers of the automaton of each scene."""
-        self.lattice.load(fillings)
+        self.lattice.upload(fillings)
         fillings.write(self.parameters, parameters_of)
-        self.placement.load(fillings)
+        self.placement.upload(fillings)
 
     @ti.func
     def reset(self, s):

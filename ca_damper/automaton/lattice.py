@@ -118,7 +118,7 @@ class Lattice:
             self.neighbour = ti.field(ti.i16, shape=(*of_cells, KINDS))
         self.cosine = ti.field(ti.f64, shape=(KINDS, DIRECTIONS))
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Take over the geometry of each scene."""
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()

@@ -56,7 +56,9 @@ class Container:
         per_mode = ("stiffness", "damping", "share", "pushed", "lag", "constant")
         self.Load = ti.types.struct(scene=ti.i32, start=ti.f64, **dict.fromkeys(per_mode, vector))
 
-    def load(self, mount: Mount, numbers: dict[str, np.ndarray], rtol: float, atol: float) -> None:
+    def upload(
+        self, mount: Mount, numbers: dict[str, np.ndarray], rtol: float, atol: float
+    ) -> None:
         """Take over the numbers of a batch: of its mount by name, and its tolerances."""
         assign(self.tolerance, [rtol, atol])
         assign(self.group, mount.group)

@@ -64,7 +64,7 @@ class DamperEngine(Engine):
         self.coupling = Coupling(self.table, self.clock, *parts)
         self.is_compiled = False
 
-    def load(
+    def upload(
         self,
         fillings: Fillings,
         table: SceneTable,
@@ -74,12 +74,12 @@ class DamperEngine(Engine):
         excitation: Excitation,
     ) -> None:
         """Take over the numbers of a batch; the state follows with ``coupling.start``."""
-        self.table.load(table)
+        self.table.upload(table)
         fillings.write(self.table.gravity, gravity_along)
         fillings.write(self.table.weight, lambda one: one.particle_mass * gravity_along(one))
-        self.container.load(mount, mount.numbers(table), rtol, atol)
-        self.excitation.load(excitation)
-        self.device.load(fillings)
+        self.container.upload(mount, mount.numbers(table), rtol, atol)
+        self.excitation.upload(excitation)
+        self.device.upload(fillings)
 
 
 _POOL = EnginePool(DamperEngine, _LEAST)

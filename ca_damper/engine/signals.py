@@ -16,7 +16,7 @@ from taichi_dem.kit.allocation import assign
 class DeviceSignal:
     """A Signal on the device, the "base" or "force"; nodes: value and second derivative."""
 
-    # Written by ``load``, so that a checkpoint leaves them out.
+    # Written by ``upload``, so that a checkpoint leaves them out.
     constant_fields = ("nodes", "last", "step")
 
     def __init__(self, table: SceneFields, clock: CycleClock, role: str):
@@ -24,7 +24,7 @@ class DeviceSignal:
         self.nodes = ti.Vector.field(2, ti.f64, shape=table.length(f"{role}_nodes"))
         self.last, self.step = ti.field(ti.i32, shape=()), ti.field(ti.f64, shape=())
 
-    def load(self, excitation: Excitation) -> None:
+    def upload(self, excitation: Excitation) -> None:
         """Take over the signal of a batch."""
         signal: Signal = getattr(excitation, self.role)
         assign(self.nodes, np.column_stack([signal.value, signal.bend]))
@@ -58,8 +58,8 @@ class SineBase:
     def __init__(self, table: SceneFields, clock: CycleClock, role: str):
         self.table, self.clock = table, clock
 
-    def load(self, excitation: Excitation) -> None:
-        """Nothing to load beside the table."""
+    def upload(self, excitation: Excitation) -> None:
+        """Nothing to upload beside the table."""
 
     @ti.func
     def at(self, s, start, t):
@@ -83,8 +83,8 @@ class NoForce:
     def __init__(self, *parts: Any):
         pass
 
-    def load(self, excitation: Excitation) -> None:
-        """Nothing to load."""
+    def upload(self, excitation: Excitation) -> None:
+        """Nothing to upload."""
 
     @ti.func
     def at(self, s, start, t):
@@ -104,7 +104,7 @@ class DeviceExcitation:
         self.base = _BASES[kind.base](table, clock, "base")
         self.force = _FORCES[kind.force](table, clock, "force")
 
-    def load(self, excitation: Excitation) -> None:
+    def upload(self, excitation: Excitation) -> None:
         """Take over the excitation of a batch."""
-        self.base.load(excitation)
-        self.force.load(excitation)
+        self.base.upload(excitation)
+        self.force.upload(excitation)

@@ -61,7 +61,7 @@ class SceneFields:
         """Number of places of a scene along an axis."""
         return self.sizes[length] if isinstance(length, str) else length
 
-    def load(self, table: SceneTable) -> None:
+    def upload(self, table: SceneTable) -> None:
         """Take over the rows of a table that fits."""
         assign(self.scenes, table.count)
         for name in SceneTable.COLUMNS:

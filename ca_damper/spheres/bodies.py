@@ -71,7 +71,7 @@ class SphereBodies:
         if thrown:
             self.start_velocity = table.vector(2, ti.f64, "spheres")
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Write the numbers of each scene to the device."""
         fillings.write(self.body, _body)
         fillings.write(self.radii, lambda one: one.radii)

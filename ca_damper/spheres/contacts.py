@@ -45,7 +45,7 @@ class OfSizes:
         self.table, self.kinds = self.bodies.table, self.bodies.kinds
         self.contact = self.table.structs(Contact, count)
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Take over the numbers of the spheres of each scene."""
         fillings.write(self.contact, self._contacts)
 

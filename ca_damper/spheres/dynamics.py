@@ -60,10 +60,10 @@ class DeviceSpheres:
         self.given, self.lost = table.field(ti.f64), table.field(ti.f64)
         self.held, self.allowed = table.field(ti.f64), table.field(ti.f64)
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Take over the numbers of the spheres of each scene."""
         for part in (self.bodies, self.search, self.pair_contacts, self.wall_contacts):
-            part.load(fillings)
+            part.upload(fillings)
 
     @ti.func
     def reset(self, s):

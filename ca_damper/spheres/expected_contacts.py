@@ -36,9 +36,9 @@ class ExpectedContacts:
         for name in ("unlisted", "skipped"):
             setattr(self, name, table.field(ti.i64))
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Write the numbers of the search to the device."""
-        self.cells.load(fillings)
+        self.cells.upload(fillings)
 
     @ti.func
     def clear(self, s):

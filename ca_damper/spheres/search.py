@@ -39,7 +39,7 @@ class AllPairs:
         self.sphere, self.sphere_count = table.field(ti.i32, "spheres"), table.field(ti.i32)
         self.full = table.field(ti.i32)
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Nothing to write."""
 
     @ti.func
@@ -111,7 +111,7 @@ class CellList:
         self.travel = table.field(ti.f64)
         self.full = table.field(ti.i32)
 
-    def load(self, fillings: Fillings) -> None:
+    def upload(self, fillings: Fillings) -> None:
         """Write the skin and the grid of each scene to the device."""
         fillings.write(self.grid, grid_of)
 

@@ -50,8 +50,8 @@ class Contacts:
         self.search_requested = ti.field(ti.i32, shape=())
         self.outer_waits = ti.field(ti.i32, shape=())
 
-    def load(self, model: Model, method: Method) -> None:
-        """Load the numbers of a scene and a method; no pairs exist yet."""
+    def upload(self, model: Model, method: Method) -> None:
+        """Upload the numbers of a scene and a method; no pairs exist yet."""
         effect = model.geometry
         assign(self.outer_waits, int(effect.outer_faces == ONCE_BROKEN))
         assign(self.skin, effect.skin * model.spheres.extent)
@@ -218,8 +218,8 @@ class Breaks:
                 ti.field(ti.i32, shape=self.tables.capacity.faces) for _ in range(2)
             )
 
-    def load(self, model: Model) -> None:
-        """Load the corners of a scene."""
+    def upload(self, model: Model) -> None:
+        """Upload the corners of a scene."""
         if not self.contacts.geometry.by_face:
             assign(self.corner, model.mesh.tetrahedra.reshape(-1))
 

@@ -74,10 +74,10 @@ class BroadPhase:
         self.phases = self._phases(n)
         self.tasks = tasks(self.phases, n)
 
-    def load(self, model: Model, method: Method) -> None:
-        """Load a scene; the first search makes all lists."""
+    def upload(self, model: Model, method: Method) -> None:
+        """Upload a scene; the first search makes all lists."""
         self.neighbours.forget()
-        self.breaks.load(model)
+        self.breaks.upload(model)
 
     def ask(self, everywhere: bool = False) -> None:
         """Request a search before the next step."""

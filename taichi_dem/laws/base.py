@@ -61,6 +61,8 @@ class Effect:
     def __init_subclass__(cls, **options: Any) -> None:
         """Name a class that states no name of its own; reports list no null object."""
         super().__init_subclass__(**options)
+        if "load" in vars(cls):
+            raise InputError(f"{cls.__name__}.load is now called upload(model): rename the method")
         if "name" not in vars(cls):
             words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).strip("_").lower()
             cls.name = "" if cls.is_null else words
@@ -97,7 +99,7 @@ class Effect:
     def declare_columns(self, store: PairStore) -> None:
         """Declare data for each pair of bodies, or of spheres; called in scenes with contact."""
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Fill the declared fields for a scene; they are zero before."""
 
     def stand_for(self, given: "Effect") -> None:
@@ -109,13 +111,13 @@ class Effect:
         """Whether the effect that this bound one stands for is silent."""
         return bool(self._given.get("is_silent"))
 
-    def load_scene(self, model: Model) -> None:
-        """Load the numbers of the effect that this bound one stands for."""
+    def upload_scene(self, model: Model) -> None:
+        """Upload the numbers of the effect that this bound one stands for."""
         if self.stands_silent:
             model = model.harmless()
         if self._count:
             assign(self.law, _numbers_of(self, model.materials))
-        self.load(model)
+        self.upload(model)
 
     def accepts(self, given: "Effect") -> bool:
         """Whether kernels compiled for this effect are valid for an effect of a scene.

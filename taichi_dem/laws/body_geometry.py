@@ -101,8 +101,8 @@ class BodyGeometry(Geometry):
         """Compare all pairs anew, wherever bodies have been put."""
         assign(self.clear_until, 0.0)
 
-    def load(self, model: Model) -> None:
-        """Load the bodies of a scene."""
+    def upload(self, model: Model) -> None:
+        """Upload the bodies of a scene."""
         corners, normal, ends = _corners(model), _outward(model.mesh), ray_ends(self.parts)
         area = length(normal)
         normal /= area[..., None]

@@ -45,7 +45,7 @@ class Softening(TensionLaw):
         """Elastic limit [m] and secant stiffness [Pa/m] of every contact unit."""
         self.unit = ti.Vector.field(2, ti.f64, shape=capacity.units)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Set every unit intact."""
         stiffness = np.repeat(model.bond_stiffness[:, 0], 3)
         strength = model.of_bonds(lambda material: material.tensile_strength)
@@ -163,7 +163,7 @@ class BondDamping(Dashpot):
         """Normal and tangential coefficient of every bond per area [Pa s/m]."""
         self.coefficient = ti.Vector.field(2, real, shape=capacity.bonds)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Take the coefficients of the material."""
         assign(self.coefficient, model.bond_damping)
 

@@ -64,7 +64,7 @@ class History:
         self.values = ti.field(real, shape=MOST_POINTS)
         self.integral = ti.field(real, shape=MOST_POINTS)
 
-    def load(self, times: tuple[float, ...], values: tuple[float, ...]) -> None:
+    def upload(self, times: tuple[float, ...], values: tuple[float, ...]) -> None:
         """Take over points of ``history_points``; one that never changes needs none."""
         t, v = np.array(times), np.array(values)
         areas = 0.5 * (v[1:] + v[:-1]) * np.diff(t)

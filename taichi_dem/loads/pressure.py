@@ -75,7 +75,7 @@ class FaceLoad(Load):
         self.area = ti.Vector.field(3, ti.f64, shape=capacity.faces)
         self.arm = ti.Vector.field(3, ti.f64, shape=capacity.faces)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Find the loaded faces; InputError when the mesh has no such group."""
         body, face = faces_of_group(model.mesh, model.topology, self.group)
         order = np.argsort(body, kind="stable")
@@ -170,10 +170,10 @@ class Pressure(FacePressure):
         super().declare(capacity)
         self.history = History()
 
-    def load(self, model: Model) -> None:
-        """Find the loaded faces and load the history; InputError for an unknown group."""
-        super().load(model)
-        self.history.load(self.times, self.values)
+    def upload(self, model: Model) -> None:
+        """Find the loaded faces and upload the history; InputError for an unknown group."""
+        super().upload(model)
+        self.history.upload(self.times, self.values)
 
     @ti.func
     def changes(self, since, until):
@@ -345,9 +345,9 @@ class ExpandingGas(GasPressure):
         super().declare(capacity)
         self.rest = ti.Vector.field(3, ti.f64, shape=capacity.bodies)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Find the loaded faces; InputError when the mesh has no such group."""
-        super().load(model)
+        super().upload(model)
         assign(self.rest, model.centre)
 
     @ti.func

@@ -46,7 +46,7 @@ class _Support(Support):
     def declare(self, capacity: Capacity) -> None:
         self.marked = ti.field(ti.i32, shape=capacity.bodies)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         body, _ = faces_of_group(model.mesh, model.topology, self.group)
         marks = np.zeros(model.body_count, dtype=np.int32)
         marks[body] = 1
@@ -72,9 +72,9 @@ class _TurningSupport(_Support):
         if self.turns:
             self.arm = ti.Vector.field(3, ti.f64, shape=capacity.bodies)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Mark the bodies and find where they are held; refuse bodies of other supports."""
-        super().load(model)
+        super().upload(model)
         if self.turns:
             check_alone(self, self._given, model)
             assign(self.arm, hinge_arms(model, self.group, self.about))
@@ -127,9 +127,9 @@ class Roller(_TurningSupport):
         self.across = ti.Vector.field(3, ti.f64, shape=capacity.bodies)
         self.swivels = ti.field(ti.i32, shape=capacity.bodies)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Share the directions that a body may not move in among the rollers that hold it."""
-        super().load(model)
+        super().upload(model)
         rollers = [effect for effect in model.supports if isinstance(effect, Roller)]
         shares: dict[tuple, np.ndarray] = {}
         # In an order of the planes, so that it does not depend on that of the scene.
@@ -223,10 +223,10 @@ class PrescribedMotion(_TurningSupport):
         super().declare(capacity)
         self.shares = History()
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Mark the bodies; InputError where another support asks for another motion."""
-        super().load(model)
-        self.shares.load(*self._points)
+        super().upload(model)
+        self.shares.upload(*self._points)
         mine = set(faces_of_group(model.mesh, model.topology, self.group)[0].tolist())
         for effect in model.supports:
             if _allows(effect, self):
@@ -352,7 +352,7 @@ class QuietBoundary(Ground):
         self.faces = ti.field(ti.i32, shape=capacity.bodies)
         self.parts = ti.field(real, shape=(capacity.bodies, 27))
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Find the faces and their impedance; InputError when the mesh has no such group."""
         body, face = faces_of_group(model.mesh, model.topology, self.group)
         corners = face_vertices(model.mesh, body, face)

@@ -72,8 +72,8 @@ class ContactLimits:
         self.root_mass = ti.field(real, shape=tables.capacity.bodies)
         self.root_inertia = ti.Matrix.field(3, 3, real, shape=tables.capacity.bodies)
 
-    def load(self, model: Model, ahead: float) -> None:
-        """Load a model, and the time [s] that a step of level 0 looks ahead."""
+    def upload(self, model: Model, ahead: float) -> None:
+        """Upload a model, and the time [s] that a step of level 0 looks ahead."""
         assign(self.ahead, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
         root = inverse_root(model.body_mass, model.body_inertia)
         assign(self.root_mass, root[:, 0, 0])
@@ -209,19 +209,19 @@ class StabilityLimits(Places):
         self.events, self.listed = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.listed_count, self.woken = (ti.field(ti.i32, shape=()) for _ in range(2))
 
-    def load(self, model: Model, method: Method) -> None:
-        """Load the bonds of a model and the numbers of a method."""
+    def upload(self, model: Model, method: Method) -> None:
+        """Upload the bonds of a model and the numbers of a method."""
         rule = method.control or StepControl()
         assign(self.rule, np.array([method.dt0, rule.safety, rule.dashpot_floor]))
         assign(self.jump, rule.level_jump or 0)
         distance: Any = method.distance
         if self.has_distance:
-            self.displacement.load(distance, method.dt0)
+            self.displacement.upload(distance, method.dt0)
         if self.has_load:
-            self.leap.load(distance, method.dt0)
-        self.turn.load(rule.angle, method.dt0)
+            self.leap.upload(distance, method.dt0)
+        self.turn.upload(rule.angle, method.dt0)
         if self.has_contact:
-            self.contact_limits.load(model, rule.ahead * method.dt0)
+            self.contact_limits.upload(model, rule.ahead * method.dt0)
         if self.tables.dashpot.name:
             assign(self.dashpot_table, model.dashpot_rates)
         if self.controlled:

@@ -36,7 +36,7 @@ class Activity:
         self.evaluated = ti.field(ti.i64, shape=bonds)
         self.touched = ti.Vector.field(2, ti.i64, shape=tables.capacity.bodies)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Begin with no bond near a limit; all fields are zero before."""
         assign(self.since, np.full((model.bond_count, PARTS), NEVER))
         assign(self.touched, np.full((model.body_count, 2), LATER))
@@ -143,7 +143,7 @@ class State:
             self.cut_short = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())
 
-    def load(self, model: Model, max_speed: float) -> None:
+    def upload(self, model: Model, max_speed: float) -> None:
         """Put the bodies where the mesh has them, at rest; all fields are zero before."""
         n = model.body_count
         if self.tables.has_contact:
@@ -154,7 +154,7 @@ class State:
         assign(self.passed, np.full((model.bond_count, 2), NEVER))
         assign(self.limits, unserved_limits(model))
         if self.activity is not None:
-            self.activity.load(model)
+            self.activity.upload(model)
         self.set_motion(model.centre)
 
     def set_motion(

@@ -164,7 +164,7 @@ class Tables:
         self.cluster = ti.Vector.field(4, real, shape=capacity.faces)
         self.extent = ti.field(real, shape=capacity.bodies)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Take over a model; all fields are zero before."""
         assign(self.body_count, model.body_count)
         assign(self.bond_count, model.bond_count)
@@ -180,7 +180,7 @@ class Tables:
         if self.has_contact:
             self._load_spheres(model.spheres)
         for effect in self.effects:
-            effect.load_scene(model)
+            effect.upload_scene(model)
 
     @ti.func
     def pair(self, i, j):

@@ -65,7 +65,7 @@ class Sleeping(Places):
         self.chunk_first = ti.field(ti.i32, shape=n + 1)
         self.left_out = ti.Vector.field(2, real, shape=tables.capacity.bonds)
 
-    def load(self, model: Model, share: float) -> None:
+    def upload(self, model: Model, share: float) -> None:
         """Begin with all bodies asleep; all fields are zero before."""
         assign(self.since, np.full(model.body_count, NEVER))
         assign(self.share, share)

@@ -70,7 +70,7 @@ class Session:
 
     def fail(self):
         """An effect that fails in one way or another."""
-        effect = faulty(self.rng.choice(["declare", "load"]))
+        effect = faulty(self.rng.choice(["declare", "upload"]))
         with pytest.raises((InputError, ZeroDivisionError)):
             Simulation(Scene(pair(), CONCRETE, [effect]), METHOD)
 

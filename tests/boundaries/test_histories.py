@@ -70,7 +70,7 @@ def test_values_are_linear_between_the_points_and_constant_beyond(probe, count):
     draw = np.random.default_rng(count)
     times, values = np.cumsum(draw.uniform(0.1, 2.0, count)), draw.normal(size=count)
     asked = np.concatenate([times, draw.uniform(-1.0, times[-1] + 1.0, 200), [0.0, 1e9]])
-    probe.history.load(tuple(times), tuple(values))
+    probe.history.upload(tuple(times), tuple(values))
     assert np.abs(probe.means(asked, asked) - np.interp(asked, times, values)).max() < 1e-12
     since = draw.uniform(-1.0, times[-1] + 1.0, 50)
     until = since + 10.0 ** draw.uniform(-9.0, 2.0, 50)

@@ -58,7 +58,7 @@ class DeviceKicks:
         self.trace = table.vector(5, ti.f64, "traced")
         self.now = table.field(ti.i32)
 
-    def load(self, fillings):
+    def upload(self, fillings):
         kicks = fillings.one
         assign(self.numbers, np.array([kicks.strength, kicks.mass]))
         assign(self.steps, np.array([kicks.diverges_at, kicks.traced]))

@@ -64,7 +64,7 @@ class BondDashpots:
         groups.place(self.start)
         self.by_colour = Coloured(self.colour_first, BOND_COLOURS, self.groups)
 
-    def load(self, model: Model, method: ImplicitDashpots) -> None:
+    def upload(self, model: Model, method: ImplicitDashpots) -> None:
         """Colour the bonds of a model and take the numbers of a method."""
         assign(self.theta, np.array([method.theta, (1.0 - method.theta) / method.theta]))
         assign(self.refresh_every, max(1, round(method.refresh / method.dt)))

@@ -32,12 +32,12 @@ class Solver:
         self.first_change2, self.residual2 = (ti.field(real, shape=()) for _ in range(2))
         self.speed2, self.worst = (ti.field(real, shape=()) for _ in range(2))
 
-    def load(self, model: Model, method: ImplicitDashpots) -> None:
-        """Load the numbers of a method, and the bonds of a model."""
+    def upload(self, model: Model, method: ImplicitDashpots) -> None:
+        """Upload the numbers of a method, and the bonds of a model."""
         assign(self.bounds, np.array(method.sweeps))
         assign(self.tolerance, method.tolerance)
         if self.bonds is not None:
-            self.bonds.load(model, method)
+            self.bonds.upload(model, method)
 
     @ti.func
     def begin(self, one):

@@ -46,13 +46,13 @@ class Clock:
         self.low, self.finest = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.evaluations = ti.field(ti.i64, shape=6)
 
-    def load(self, model: Model, method: Method, sleep: float) -> None:
-        """Load the steps of a method; sleep: see ``Scene``."""
+    def upload(self, model: Model, method: Method, sleep: float) -> None:
+        """Upload the steps of a method; sleep: see ``Scene``."""
         assign(self.step_seconds, method.dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
         if self.has_limits:
-            self.limits.load(model, method)
+            self.limits.upload(model, method)
         if self.sleeping is not None:
-            self.sleeping.load(model, sleep)
+            self.sleeping.upload(model, sleep)
 
     @property
     def dt0(self) -> float:

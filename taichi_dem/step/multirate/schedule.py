@@ -37,11 +37,11 @@ class Schedule(Clock):
         self.spreads = self.controlled and not self.uniform and self.limits.spreads
         self.level_limit = LevelLimit(self, self.lists) if self.spreads else None
 
-    def load(self, model: Model, method: Method, sleep: float) -> None:
-        """Load the steps of a method; sleep: see ``Scene``."""
-        super().load(model, method, sleep)
-        # A user-defined rule may have no numbers to load.
-        getattr(self.criterion, "load", lambda *_: None)(method.distance, method.dt0)
+    def upload(self, model: Model, method: Method, sleep: float) -> None:
+        """Upload the steps of a method; sleep: see ``Scene``."""
+        super().upload(model, method, sleep)
+        # A user-defined rule may have no numbers to upload.
+        getattr(self.criterion, "upload", lambda *_: None)(method.distance, method.dt0)
 
     @ti.func
     def advance_clock(self, one):
