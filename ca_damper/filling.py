@@ -1,7 +1,7 @@
 """Interface of a filling of the container: its input is the motion, its output the load.
 
 A filling is a frozen dataclass of a user's options (``Filling``). It binds itself to the scenes of
-an engine (``DeviceFilling``), which then runs every batch of the same ``Structure``.
+an engine (``DeviceFilling``), which then runs every batch of the same ``FillingStructure``.
 ``fixed_mass.py`` has a complete example.
 """
 
@@ -82,7 +82,7 @@ LEAST_PLACES = 256
 
 
 @dataclass(frozen=True)
-class Structure:
+class FillingStructure:
     """Compiled structure of a filling; fillings of equal ``key`` share their compiled kernels.
 
     Parameters
@@ -125,11 +125,11 @@ class Fillings:
                 )
 
     @property
-    def structure(self) -> "Structure":
+    def structure(self) -> "FillingStructure":
         """What is compiled, with room for the largest."""
         sizes = [one.structure.sizes for one in self.kinds]
         most = {name: max(one[name] for one in sizes) for name in sizes[0]}
-        return Structure(self.kinds[0].structure.key, most)
+        return FillingStructure(self.kinds[0].structure.key, most)
 
     def activated(self, particles: int) -> tuple["Fillings", tuple[Estimate, ...]]:
         """The fillings with the effects that are needed, and estimates of those decided on."""
@@ -243,7 +243,7 @@ class Filling(Protocol):
         """Longest step that it allows or advises [s], and why; None for no limit."""
 
     @property
-    def structure(self) -> Structure:
+    def structure(self) -> FillingStructure:
         """What is compiled; fillings of a class and an equal structure share it."""
 
     def check(self, particles: int, dt: float) -> None:

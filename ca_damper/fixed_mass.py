@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import taichi as ti
 
-from ca_damper.filling import Action, Fillings, Structure
+from ca_damper.filling import Action, Fillings, FillingStructure
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_table import EffectUse
 from taichi_dem.kit.errors import InputError
@@ -24,8 +24,8 @@ class _Fixed:
         return "is fixed", dt
 
     @property
-    def structure(self) -> Structure:
-        return Structure(())
+    def structure(self) -> FillingStructure:
+        return FillingStructure(())
 
     def bind(self, table: SceneFields) -> "FixedMass":
         return FixedMass(table)

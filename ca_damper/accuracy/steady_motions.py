@@ -10,7 +10,7 @@ from ca_damper.accuracy.runs import SceneKey, SceneRuns, SteadyRuns
 from ca_damper.errors import SimulationDiverged
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
-from ca_damper.report.peak_search import Lattice, PeakSearch
+from ca_damper.report.peak_search import PeakSearch, RatioGrid
 from ca_damper.runs.response import Response
 from ca_damper.spheres.options import Spheres
 from taichi_dem.kit.bars.answer import largest
@@ -66,7 +66,7 @@ class SteadyMotions(BaseRuns):
         self.few = self.seeds = self._first_seeds()
         self.window, self.margin = _LEAST_WINDOW, 0
         # Level of the step of the pilot, ratio of the peak, and the frequencies around it.
-        self.coarse, self.peak, self.lattice, self.fineness = 0.0, math.nan, Lattice(1.0, 1.0), 0
+        self.coarse, self.peak, self.lattice, self.fineness = 0.0, math.nan, RatioGrid(1.0, 1.0), 0
         self.steady = SteadyRuns(runs, question.budget_s, self._goal_series)
         self.readings = SteadyReadings(self.steady)
         self._known: dict[tuple, np.ndarray] = {}

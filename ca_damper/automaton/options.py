@@ -10,7 +10,7 @@ from ca_damper.automaton.device import LatticeDevice
 from ca_damper.automaton.rules.contract import Rules
 from ca_damper.automaton.rules.paper import Paper
 from ca_damper.automaton.rules.place import Place
-from ca_damper.filling import Structure
+from ca_damper.filling import FillingStructure
 from ca_damper.report.certificate import CheckedRange, Driven
 from ca_damper.scenes.gravity import checked_gravity, gravity_across
 from ca_damper.scenes.scene_fields import SceneFields
@@ -243,12 +243,12 @@ class Automaton:
         return words[code - 1], 0.2 * dt
 
     @property
-    def structure(self) -> Structure:
+    def structure(self) -> FillingStructure:
         """Rules are compiled; numbers, the size of the lattice and the cells of start are not."""
         tilted = gravity_across(self) != 0.0
         key = (self.rules.compiled, self.traversal, self.start is None, tilted)
         # One more for the cell beyond the lattice.
-        return Structure(key, {"cells": (self.columns + 2) * (self.rows + 2) + 1})
+        return FillingStructure(key, {"cells": (self.columns + 2) * (self.rows + 2) + 1})
 
     def bind(self, table: SceneFields) -> LatticeDevice:
         """The automaton on the device, for all scenes of a table."""

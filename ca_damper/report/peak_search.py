@@ -20,7 +20,7 @@ LEAST_RATIO, MOST_RATIO = 0.05, 4.0
 
 
 @dataclass(frozen=True)
-class Lattice:
+class RatioGrid:
     """Ratios origin + k spacing / 2^level, the same numbers whatever way they are found."""
 
     origin: float
@@ -68,10 +68,10 @@ class PeakSearch:
     ):
         self.rms_at, self.may_extend, self.finest = rms_at, may_extend, finest
         self.lowest, self.highest = lowest, highest
-        self.lattice, self.level = Lattice(lowest, (highest - lowest) / FIRST), 0
+        self.lattice, self.level = RatioGrid(lowest, (highest - lowest) / FIRST), 0
         self.found: dict[float, float] = {}
 
-    def run(self) -> tuple[float, Lattice, int]:
+    def run(self) -> tuple[float, RatioGrid, int]:
         """Ratio of the peak, the lattice, and its level on which the peak is resolved."""
         ends = range(FIRST + 1)
         self._measure([self.lattice.ratio(k, 0) for k in ends])

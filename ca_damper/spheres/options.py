@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from operator import mul
 from typing import ClassVar
 
-from ca_damper.filling import LEAST_PLACES, DeviceFilling, Structure
+from ca_damper.filling import LEAST_PLACES, DeviceFilling, FillingStructure
 from ca_damper.scenes.gravity import checked_gravity, gravity_across, gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import FRICTION_LAWS, POWERS, contact_duration, pair_numbers
@@ -296,13 +296,13 @@ class Spheres:
         return self.safe_step(), "five steps in a contact"
 
     @property
-    def structure(self) -> Structure:
+    def structure(self) -> FillingStructure:
         """Effects, laws and the search are compiled; numbers, box and places of start are not."""
         key = (self.damping, self.rubs, self.remembers, self.rotation, self.search)
         given = self.start is not None, self.start_velocity is not None
         # As many as go with the spheres of an engine, so that both find room or neither.
         pairs = listed_pairs(power_of_two(self.capacity, LEAST_PLACES))
-        return Structure(
+        return FillingStructure(
             (*key, *given, len(self.radii)), {"spheres": self.capacity, "pairs": pairs}
         )
 

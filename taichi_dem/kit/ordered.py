@@ -84,7 +84,7 @@ class Some(Places):
 
 
 @ti.data_oriented
-class When(Places):
+class OnlyIf(Places):
     """A list that is empty unless a function says 1."""
 
     def __init__(self, due: Callable[..., Any], members: Any):

@@ -58,7 +58,7 @@ def body_record(drives: int) -> np.dtype:
 
 
 @ti.data_oriented
-class Columns:
+class RecordColumns:
     """Column at which each name of a record begins, in a table of numbers."""
 
     def __init__(self, record: np.dtype):
@@ -84,7 +84,7 @@ class Readings:
         self.half_step = HalfStep(step)
         # A loop over few bodies takes less time than two threads to be told of it.
         self.body = body_record(len(self.tables.drives))
-        self.of_body, self.of_bond, self.of_pair = map(Columns, (self.body, BOND, PAIR))
+        self.of_body, self.of_bond, self.of_pair = map(RecordColumns, (self.body, BOND, PAIR))
         self.small = self.tables.capacity.bodies < _FEW and backend.is_cpu()
         self._held: dict[str, Any] | None = None
         self._rooms: dict[str, np.ndarray] = {}

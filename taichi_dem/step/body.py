@@ -18,7 +18,7 @@ from taichi_dem.step.multirate.schedule import Schedule
 
 
 @ti.data_oriented
-class BodyMotion:
+class BodyStep:
     """Impulses in the slots of a body, and its drift."""
 
     def __init__(self, schedule: Schedule):

@@ -67,7 +67,7 @@ class PairForces:
 
 
 @ti.dataclass
-class Answer:
+class ContactAnswer:
     """Force of one contact on the second body [N], its normal part, its friction; powers [W].
 
     slipped: energy that a spring of friction lost [J].
@@ -202,14 +202,14 @@ class ContactForces:
 
     @ti.func
     def answer(self, m, k, i, met, touch, push, velocity, scale, elapsed, stepping: ti.template()):
-        """The ``Answer`` of the laws to a touch."""
+        """The ``ContactAnswer`` of the laws to a touch."""
         damping = self.law.damping_at(self.law.row(m), touch.overlap)
         weighted = self._limited(met.weight * touch.rate, scale)
         drag = met.area * self._limited(met.weight * damping, scale)
         pressed = met.area * ti.max(0.0, push.elastic - damping * weighted)
         slide = velocity - dot(velocity, met.normal) * met.normal
         rub, stuck, spent = self._rub(m, k, i, met.normal, pressed, drag, slide, elapsed, stepping)
-        return Answer(
+        return ContactAnswer(
             force=pressed * met.normal + rub,
             pressed=pressed,
             rub=rub,

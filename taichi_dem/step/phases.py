@@ -9,7 +9,7 @@ from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit import backend
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import squared
-from taichi_dem.step.body import BodyLoads, BodyMotion
+from taichi_dem.step.body import BodyLoads, BodyStep
 from taichi_dem.step.bond import BondForces
 from taichi_dem.step.multirate.schedule import Schedule
 
@@ -101,7 +101,7 @@ class Step:
         self.schedule, self.search = schedule, search
         self.tables, self.state = schedule.tables, schedule.state
         self.has_contact = search is not None
-        self.motion, self.loads = BodyMotion(schedule), BodyLoads(schedule)
+        self.motion, self.loads = BodyStep(schedule), BodyLoads(schedule)
         self.bonds = BondForces(schedule)
 
     def phases(self) -> tuple:

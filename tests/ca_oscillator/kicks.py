@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import taichi as ti
 
-from ca_damper.filling import Action, Structure
+from ca_damper.filling import Action, FillingStructure
 from taichi_dem.kit.allocation import assign
 
 #: The seed whose scene diverges.
@@ -43,7 +43,7 @@ class Kicks:
 
     @property
     def structure(self):
-        return Structure((), {"traced": self.traced})
+        return FillingStructure((), {"traced": self.traced})
 
     def bind(self, table):
         return DeviceKicks(table)

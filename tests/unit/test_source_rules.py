@@ -5,6 +5,7 @@ The wheel carries all files of both packages; every mutant of the table can be m
 
 import ast
 import tomllib
+from collections import Counter
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -83,6 +84,16 @@ def test_no_module_imports_itself_by_way_of_others():
         modules = {name if name in paths else name.rpartition(".")[0] for name in names}
         before[module] = modules & {*paths} - {module}
     TopologicalSorter(before).prepare()  # raises CycleError
+
+
+#: Classes that users know by the same name in both packages.
+OF_BOTH = {"Certificate", "Goal", "Report", "SimulationDiverged"}
+
+
+def test_a_class_name_stands_once():
+    nodes = [node for path in PATHS for node in ast.walk(parsed(path))]
+    names = Counter(node.name for node in nodes if isinstance(node, ast.ClassDef))
+    assert {name for name, count in names.items() if count > 1} == OF_BOTH
 
 
 def atomic_sums(tree):

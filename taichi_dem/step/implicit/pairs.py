@@ -9,7 +9,7 @@ from taichi_dem.kit.products import cross, dot, matvec, squared
 from taichi_dem.kit.types import real, vec3, vec4
 from taichi_dem.physics.rotation import unit3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to
-from taichi_dem.step.contact_force import Answer, ContactForces
+from taichi_dem.step.contact_force import ContactAnswer, ContactForces
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.multirate.lists import Coloured
 from taichi_dem.step.multirate.schedule import Schedule
@@ -357,14 +357,14 @@ class PairDashpots(ContactForces):
 
     @ti.func
     def answer(self, m, k, i, met, touch, push, velocity, scale, elapsed, stepping: ti.template()):
-        """The mean force of the last step, an ``Answer``."""
+        """The mean force of the last step, an ``ContactAnswer``."""
         force = self.impulse[k] / self.schedule.step_seconds[0]
         pressed = dot(force, met.normal)
         rub = force - pressed * met.normal
         free = rub
         if ti.static(self.springs.present):
             free -= self.springs.force(m, k, self.state.rotation(i))
-        return Answer(force=force, pressed=pressed, rub=rub, rubbed=-dot(free, velocity))
+        return ContactAnswer(force=force, pressed=pressed, rub=rub, rubbed=-dot(free, velocity))
 
     @ti.func
     def _slip(self, m, p, c, i, j, pressed):

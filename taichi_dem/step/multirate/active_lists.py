@@ -5,7 +5,7 @@ from typing import Any
 import taichi as ti
 
 from taichi_dem.kit import backend
-from taichi_dem.kit.ordered import Once, Phases, Some, When, side_by_side
+from taichi_dem.kit.ordered import Once, OnlyIf, Phases, Some, side_by_side
 from taichi_dem.state.timeline import MAX_LEVEL
 from taichi_dem.step.multirate.clock import Clock
 from taichi_dem.step.multirate.lists import ActiveList, Everyone
@@ -97,7 +97,7 @@ class ActiveLists:
         """Phases that bring changed members to their places, after phases before."""
         if backend.is_cpu() or self.uniform:
             return ((Once(), move),)
-        due = tuple((When(self._has_changed, one), item) for one, item in self.filling())
+        due = tuple((OnlyIf(self._has_changed, one), item) for one, item in self.filling())
         return (*before, *due, (Once(), end))
 
     @ti.func
