@@ -11,6 +11,7 @@ copies small pictures and figures of full runs into docs, and CPU times of runs 
 and quick ones, into _gallery_pages.txt; --readme writes these into the pages.
 """
 
+import itertools
 import json
 import os
 import re
@@ -40,9 +41,9 @@ CPU_TIME = "cpu_seconds.txt"
 #: Figures by experiment, lines of the table that it writes for a page, if any, and the command, the
 #: machine and the versions of its run.
 KEPT = "docs/figures.json"
-_MARK = re.compile(
-    r"(<!--\s+figure:\s+([^>]+?),\s+(\d)\s+digits\s+-->)(.*?)(<!--\s+end\s+-->)", re.DOTALL
-)
+#: Sentences of pages with kept figures, a line each: "PAGE: words {formula, digits} words".
+SENTENCES = "docs/figures.txt"
+_FIGURE, _NUMBER = re.compile(r"\{([^{}]+), (\d)\}"), r"[\d.,]*\d"
 _TABLE = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
     "quick": "run smaller jobs",
@@ -145,24 +146,33 @@ def keep_pictures(out, folder):
             small.save(Path(folder, f"{page.name}.png"), optimize=True)
 
 
-def fill_figures(text, root):
-    """A page's text with the kept figures and tables between its marks.
+def sentences_of(page, root):
+    """Sentences of a page with kept figures: pattern with groups of words, [(formula, digits)].
 
-    Raises InputError where a mark names one that is not kept.
+    A pattern finds its sentence whatever its line ends and numbers.
+    """
+    for line in Path(root, SENTENCES).read_text(encoding="utf-8").splitlines():
+        name, _, sentence = line.partition(": ")
+        if name == page:
+            parts = (f"({re.escape(part)})" for part in _FIGURE.split(sentence)[::3])
+            yield _NUMBER.join(parts).replace(r"\ ", r"\s+"), _FIGURE.findall(sentence)
+
+
+def fill_figures(page, root):
+    """A page's text with the kept figures in its sentences and the kept tables between its marks.
+
+    Raises InputError where a sentence is not on the page, or one of its figures is not kept.
     """
     kept = json.loads(Path(root, KEPT).read_text(encoding="utf-8"))
     names = {name: SimpleNamespace(**one["figures"]) for name, one in kept.items()}
-
-    def fill(mark):
-        begin, formula, digits, _, end = mark.groups()
-        try:
-            value = eval(formula, {"__builtins__": {}}, names)
-        except (NameError, AttributeError) as error:
-            raise InputError(f"figure {formula!r} must be one kept in {KEPT}: {error}") from None
-        # So many significant digits, whole numbers by groups of three.
-        rounded = float(f"{value:.{digits}g}")
-        whole = rounded >= 10 ** (int(digits) - 1)
-        return f"{begin}{rounded:,.0f}{end}" if whole else f"{begin}{rounded:.{digits}g}{end}"
+    text = Path(root, page).read_text(encoding="utf-8")
+    for pattern, figures in sentences_of(page, root):
+        found = re.search(pattern, text)
+        if found is None:
+            raise InputError(f"{page} must have the sentence {pattern!r} of {SENTENCES}")
+        numbers = [number_of(formula, int(digits), names) for formula, digits in figures]
+        parts = itertools.zip_longest(found.groups(), numbers, fillvalue="")
+        text = text.replace(found[0], "".join(itertools.chain.from_iterable(parts)))
 
     def fill_table(mark):
         begin, name, _, end = mark.groups()
@@ -170,7 +180,17 @@ def fill_figures(text, root):
             raise InputError(f"table {name!r} must be one kept in {KEPT}")
         return "\n".join([begin, *kept[name]["table"], "", end])
 
-    return _TABLE.sub(fill_table, _MARK.sub(fill, text))
+    return _TABLE.sub(fill_table, text)
+
+
+def number_of(formula, digits, names):
+    """A kept figure with so many significant digits, whole numbers by groups of three."""
+    try:
+        value = eval(formula, {"__builtins__": {}}, names)
+    except (NameError, AttributeError) as error:
+        raise InputError(f"figure {formula!r} must be one kept in {KEPT}: {error}") from None
+    rounded = float(f"{value:.{digits}g}")
+    return f"{rounded:,.0f}" if rounded >= 10 ** (digits - 1) else f"{rounded:.{digits}g}"
 
 
 def table_of_experiments():
@@ -186,11 +206,10 @@ def renew_readme(root):
     text = path.read_text(encoding="utf-8")
     text = re.sub(r"\| name \|.*?\n\n", lambda _: f"{table}\n", text, flags=re.DOTALL)
     write_text(path, text)
-    for page in (Path(root, "README.md"), *sorted(Path(root, "docs").glob("*.md"))):
-        text = page.read_text(encoding="utf-8")
-        filled = fill_figures(text, root)
-        if filled != text:
-            write_text(page, filled)
+    for path in (Path(root, "README.md"), *sorted(Path(root, "docs").glob("*.md"))):
+        filled = fill_figures(path.relative_to(root).as_posix(), root)
+        if filled != path.read_text(encoding="utf-8"):
+            write_text(path, filled)
 
 
 if __name__ == "__main__":
