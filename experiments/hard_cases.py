@@ -19,6 +19,7 @@ import math
 import sys
 from collections import Counter
 from functools import partial
+from textwrap import fill
 
 from matplotlib.patches import Rectangle
 
@@ -122,9 +123,12 @@ def picture_wall(path, trials):
             axes.add_patch(Rectangle(place, 0.88, 0.88, **look))
         axes.set(xlim=(-0.1, columns), ylim=(-(-len(names) // columns), -0.1), aspect="equal")
         axes.set_axis_off()
+        thin = ", ".join(name.replace("_", " ") for name in names if levels[name] == "1 to 2")
+        axes.set_title(fill(thin and f"1 to 2: {thin}", 72), fontsize=8, loc="left")
         keys = [area_key(f"{name}: {counts[name]}", fc=colour) for name, colour in WALL.items()]
         look = {"loc": "outside lower center", "ncols": 3, "fontsize": 9.5, "title_fontsize": 9.5}
-        figure.legend(handles=keys, title=f"{len(names)} hard cases, by margin", **look)
+        title = f"{len(names)} hard cases, by what physics allows over what a run shows"
+        figure.legend(handles=keys, title=title, **look)
 
 
 def level_of(own):

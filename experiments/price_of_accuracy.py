@@ -121,9 +121,9 @@ def answer_of(scene, options, tolerance):
 
 
 def draw(path, prices, until):
-    """Bars of all prices over those of the paper; names left, times right."""
+    """Bars of all prices over those of the paper; names left, times and errors right."""
     names, levels = ["paper's machine", *(price.words for price in prices)], range(len(prices) + 1)
-    times = ["3,897 min", *(f"{float(f'{price.seconds:.2g}'):g} s" for price in prices)]
+    times = [f"{PAPER_SECONDS[1] / 86400.0:.1f} d, error unknown", *map(time_and_error, prices)]
     with picture(path, size=(4.8, 3.3), dpi=300) as (_, axes):
         early, late = PAPER_SECONDS
         axes.barh(0, late, color=LIGHT_GREY)
@@ -145,6 +145,12 @@ def draw(path, prices, until):
         for one in (axes, right):
             one.tick_params(axis="y", length=0)
             one.grid(axis="y", visible=False)
+
+
+def time_and_error(price):
+    """Seconds and error of a price; the error of an answer is its own bar."""
+    sign = "±" if price.key.startswith("solve") else ""
+    return f"{float(f'{price.seconds:.2g}'):g} s, {sign}{100.0 * price.error:.2g} %"
 
 
 def blast_budget(options):
