@@ -31,9 +31,8 @@ numpydoc_class_members_toctree = False
 
 #: Parts of the list of pages. A page that no part names comes under "More".
 CONTENTS = {
-    "Start": ["docs/experiments", "docs/site/gallery"],
+    "Start": ["docs/tutorial", "docs/experiments", "docs/site/gallery"],
     "Guide": [
-        "docs/tutorial",
         "docs/guide",
         "docs/sweeps",
         "docs/accuracy",
