@@ -44,7 +44,7 @@ class Periods:
         test = f"first harmonic of {self.cycles} cycles within {100.0 * self.tolerance:.2g} %"
         every = {p: "every cycle" if p == 1 else f"every {p} cycles" for p, _ in self.scenes}
         found = [f"{counted(n, 'scene')} {every[p]}" for p, n in self.scenes]
-        return f"{', '.join(found) or 'none'}, {self.others} not periodic ({test})"
+        return f"{', '.join(found) or 'no scene'}, {counted(self.others, 'scene')} never ({test})"
 
 
 @dataclass(frozen=True)

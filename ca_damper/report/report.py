@@ -143,11 +143,11 @@ class Report:
         if self.step_bound is None:
             return ""
         most, why = self.step_bound
-        return f"{why}: {most:.3g} s, {self.bound_taken:.2g} of it taken"
+        return f"{why}: {most:.3g} s, of which steps take {self.bound_taken:.2g}"
 
     def _rows(self):
         """All lines by name."""
-        gone = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
+        gone = f"{counted(len(self.diverged), 'scene')}; these and all on their structures have NaN"
         checked = self.checked
         acted = [f"{use.effect}: {use}" for use in self.effect_activity]
         acted += self.certificate.left_out_lines()
@@ -160,7 +160,7 @@ class Report:
             "diverged": f"{gone}\n{self.diverged[0]}" if self.diverged else "",
             "step bound by": self._bound(),
             "momentum error": f"{self.momentum_error:.2g} of what was exchanged",
-            "known of the error": self.known_error.replace("; ", "\n"),
+            "known error": self.known_error.replace("; ", "\n"),
             "checked with": f"{checked.words}\n{checked.finding}" if checked is not None else "",
             "steps": f"{self.scene_steps:,} of scenes, {self.particle_steps:,} of particles",
             "evaluations": f"{self.container_evaluations:,} of the container's motion",

@@ -166,8 +166,8 @@ class DivergenceCheck:
             return None
         count = counted(int((over > 1.0 + ROUNDING).any(axis=0).sum()), "body")
         words = (
-            f"the step of {count} was above its limit, that of body {body} with "
-            f"{present[body]:.3g} s, where its {[*limits][k]} allow {steps[k, body]:.3g} s"
+            f"the step of {count} was above its limit (body {body} took {present[body]:.3g} s, "
+            f"its {[*limits][k]} allow {steps[k, body]:.3g} s)"
         )
         return words, _to_try("", "step", 0.5 * float(steps.min()), "s")
 

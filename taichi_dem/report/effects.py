@@ -205,8 +205,8 @@ class Certificate(BaseCertificate):
         if self.sleep:
             asleep = (
                 f"{100.0 * self.asleep:.3g} % of body-steps (left out: at most "
-                f"{self.impulse:.1g} of the impulse, {self.energy:.1g} of the energy of a part; "
-                f"{self.sleep:g} asked)"
+                f"{self.impulse:.1g} of a part's impulse, {self.energy:.1g} of its energy; "
+                f"{self.sleep:g} allowed)"
             )
         law = f"law of bonds: {skipped:.3g} % of its evaluations skipped"
         return [law, f"asleep: {asleep}", *super().left_out_lines()]

@@ -77,8 +77,8 @@ def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
         return ""
     share = 100.0 * account["injected"] / max(put_in, 1e-300)
     return (
-        f"{account['injected']:.6g} J by overlaps of faces as they broke, {share:.3g} % of the "
-        "energy put in, which no load gave (docs/limits.md)"
+        f"{account['injected']:.6g} J, {share:.3g} % of the energy put in, came from no load but "
+        "from faces that overlapped as they broke (docs/limits.md)"
     )
 
 
@@ -91,8 +91,8 @@ def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, .
     share, of = 100.0 * residual / max(whole, 1e-300), "held" if held > given else "put in"
     return (
         f"the energy balance leaves {account['residual']:.3g} J unexplained, {share:.3g} % of the "
-        f"energy {of}: take a shorter step, or start with velocities that dashpots of bonds do "
-        "not stop within one step",
+        f"energy {of}: take a shorter step, or start with velocities that bond dashpots do not "
+        "stop within one step",
     )
 
 

@@ -19,7 +19,7 @@ from taichi_dem.state.model import Model, centres, sums
 #: Density of air [kg/m^3], and standard weight [m/s^2].
 _AIR, _WEIGHT = 1.2, 9.80665
 #: Groups in words.
-_OPENS = "stress over strength, as contact needs free faces"
+_OPENS = "faces must open first; stress over strength"
 _BENDS = "stress of the weight over tensile strength, at most"
 _SHARE = "share of the energy put in, at most"
 

@@ -81,10 +81,10 @@ class Hops(Kept):
         if not touches:
             return ()
         return (
-            f"{self.hops.sum()} bodies hop, as {second:.0f} on {first:.0f}, which have parted "
-            f"and touched again {touches - 1:.0f} times since t = {since:.4g} s and slide on at "
-            f"{1e3 * speed:.2g} mm/s, though this takes {100.0 * share:.2g} % of the friction that "
-            f"could hold them: unless a load shakes them, {self.run.model.contact.calmer} ends it",
+            f"{self.hops.sum()} bodies hop: body {second:.0f} has left body {first:.0f} and "
+            f"touched it again {touches - 1:.0f} times since t = {since:.4g} s, and slides on at "
+            f"{1e3 * speed:.2g} mm/s, although {100.0 * share:.2g} % of their friction would hold "
+            f"it; unless a load shakes them, {self.run.model.contact.calmer} ends this",
         )
 
 

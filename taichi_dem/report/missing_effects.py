@@ -18,7 +18,7 @@ from taichi_dem.state.timeline import NEVER
 _EPSILON = np.finfo(np.float64).eps
 #: Roundings of a coordinate by which two bodies side by side may seem to overlap.
 _ROUNDINGS = 16.0
-_WITHIN = "pairs of bodies are within each other"
+_WITHIN = "pairs of bodies overlap"
 #: By role, why a scene needs the usual law that it lacks.
 _FOUND = {
     "tension": "bonds are stretched past their tensile strength",
@@ -72,7 +72,7 @@ class MissingEffect:
 
     def __str__(self):
         return (
-            f"{self.effect} is left out, but {self.what}: {self.count}, first {self.unit} "
+            f"{self.effect} is left out, but {self.what}: {self.count} in all, first {self.unit} "
             f"{self.where} at {self.place} m, t = {self.first_s:.4g} s"
         )
 

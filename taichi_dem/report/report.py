@@ -241,7 +241,7 @@ class Report:
             "energy put in": put_in_words(self.energy_balance, self.round_off_J),
             "energy residual": self.unexplained,
             "injected": injected_words(self.energy_balance, self.round_off_J),
-            "known of the error": self.known_error.replace("; ", "\n"),
+            "known error": self.known_error.replace("; ", "\n"),
             "certificate": "\n".join(left_out),
             "momentum error": f"{momentum} angular",
             "time": f"{self.compile_seconds:.1f} s before the first step, {run}",

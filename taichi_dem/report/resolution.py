@@ -17,9 +17,9 @@ from taichi_dem.state.timeline import MAX_LEVEL
 #: has slid by a share s of an edge along it, (1 - s)^2 still lies on the other: at 5 % a tenth of
 #: the area that the bond acts on is gone, more than an error that a user would accept.
 MOST_SLIP = 0.05
-_SLIPPED = f"unbroken bonds have slipped by more than {100 * MOST_SLIP:g} % of an edge"
-_FULL = "the cohesion is undiminished: SlipWeakening in place of ShearSlip degrades it with slip"
-_WEAKENED = "friction acts on the whole of it: compare with a coarser mesh"
+_SLIPPED = f"intact bonds have slid by over {100 * MOST_SLIP:g} % of a face edge"
+_FULL = "keep full cohesion", "SlipWeakening in place of ShearSlip avoids this"
+_WEAKENED = "keep friction on the whole face", "compare with a coarser mesh"
 #: Least share of its coefficient at which a limited dashpot still represents the material.
 LEAST_SHARE = 0.5
 #: A bond open by this many failure openings when it fails has failed too late: its dashpots,
@@ -32,14 +32,14 @@ MOST_TAKEN = 1.0
 #: openings at failure, less shares of contact dashpots, and parts of a speed that these take.
 _ALLOWED = -LEAST_SHARE, MOST_OPENING, -LEAST_SHARE, MOST_TAKEN
 _TOO_LONG = (
-    "the dashpots of {count} bonds, and limits them to less than half, bond {worst} to "
-    "{percent:.2g} %: these bonds yield too fast",
-    "{count} bonds that failed late, bond {worst} at {value:.2g} times its failure "
-    "opening: their dashpots took energy for too long",
-    "the contact dashpots of {count} bodies, and limits them to less than half, those "
-    "of body {worst} to {percent:.2g} %: pressed bodies separate too fast",
-    "the contact dashpots of {count} bodies: those of body {worst} take {value:.2g} of "
-    "a speed in one step, and push bodies apart that they should stop",
+    "the dashpots of {count} bonds, which it weakens to less than half (bond {worst} to "
+    "{percent:.2g} %): these bonds yield too fast",
+    "{count} bonds, which failed late (bond {worst} at {value:.2g} times its failure opening): "
+    "their dashpots took energy for too long",
+    "the contact dashpots of {count} bodies, which it weakens to less than half (body {worst} "
+    "to {percent:.2g} %): pressed bodies separate too fast",
+    "the contact dashpots of {count} bodies: in one step those of body {worst} take {value:.2g} "
+    "times its speed, and push bodies apart that they should stop",
 )
 
 
@@ -86,10 +86,11 @@ class BondSlip(MissingEffect):
         return f"{100 * self.share:.3g} % of the shortest edge of its face (bond {self.where})"
 
     def __str__(self):
+        kept, advice = _WEAKENED if self.weakens else _FULL
         return (
-            f"up to {self.count} {self.what} of their face, bond {self.where} (at {self.place} m) "
-            f"by {100 * self.share:.3g} % at t = {self.first_s:.4g} s: less of both faces "
-            f"overlaps, but {_WEAKENED if self.weakens else _FULL}"
+            f"{self.count} {self.what} but {kept}, so the body may be too strong (bond "
+            f"{self.where} at {self.place} m slid by {100 * self.share:.3g} % at t = "
+            f"{self.first_s:.4g} s): {advice}"
         )
 
 
@@ -162,8 +163,8 @@ class StepResolution(Kept):
             if count:
                 found.append(
                     f"the step of {counted(count, 'body')} is above the longest that is stable for "
-                    f"sure in {link}, that of body {worst} with {own[worst]:.3g} times "
-                    f"{longest[worst]:.3g} s: energy may come from nowhere, take a shorter one "
+                    f"sure in {link} (body {worst} takes {own[worst]:.3g} times "
+                    f"{longest[worst]:.3g} s): energy may come from nowhere, take a shorter step "
                     "(step_report)"
                 )
         return tuple(found)
@@ -195,8 +196,8 @@ class StepResolution(Kept):
             return ""
         least = self.run.schedule.dt0 / 2.0**MAX_LEVEL
         return (
-            f"the shortest step of all, {least:.3g} s or 2^-{MAX_LEVEL} of the largest, was "
-            "reached: steps are not divided further; take a shorter largest step"
+            f"bodies need a step shorter than {least:.3g} s, 2^-{MAX_LEVEL} of the largest: "
+            "steps are not divided further, take a shorter largest step"
         )
 
     @property
@@ -213,9 +214,9 @@ class StepResolution(Kept):
             return ""
         allowed = float(values(solver.tolerance))
         return (
-            f"the dashpots of {steps} steps were not solved: sweeps ended with changes of up to "
-            f"{100 * worst:.2g} % of the largest speed, where {100 * allowed:.2g} % is asked; "
-            f"allow more sweeps than {int(solver.bounds[1])}, or take a shorter step"
+            f"in {steps} steps the dashpots were not solved: the last sweep changed speeds by up "
+            f"to {100 * worst:.2g} % of the largest, {100 * allowed:.2g} % is allowed; "
+            f"allow more than {int(solver.bounds[1])} sweeps, or take a shorter step"
         )
 
     def _contact_shares(self):

@@ -82,7 +82,7 @@ class Interpenetration:
             return ""
         first, second = self.deepest
         return (
-            f"bodies {first} and {second} were {1e3 * self.depth_m:.3g} mm within each other at "
+            f"bodies {first} and {second} overlapped by {1e3 * self.depth_m:.3g} mm at "
             f"t = {self.deepest_s:.4g} s, {100.0 * self.depth_share:.2g} % of the height of the "
             "smaller one"
         )
@@ -95,8 +95,8 @@ class Interpenetration:
             return "no volume shared"
         first, second = self.bodies
         return (
-            f"at most {100.0 * self.share:.2g} % of a body, by bodies {first} and {second} at "
-            f"{self.time_s:.4g} s; {self.deep} pairs above {100.0 * DEEP:g} %"
+            f"bodies {first} and {second} share {100.0 * self.share:.2g} % of the smaller one at "
+            f"t = {self.time_s:.4g} s, most; {self.deep} pairs share more than {100.0 * DEEP:g} %"
         )
 
 
@@ -188,7 +188,7 @@ class SharedVolume(Kept):
         if contact is None or worst == first:
             return tuple(found)
         law = type(contact).__name__
-        advice = f"a larger {contact.knob}, or more points, of {law} keeps them apart"
+        advice = f"a larger {contact.knob} or more points in {law} keep them apart"
         if not contact.geometry.outer_faces:
             advice = f"{remedy(contact)} lets them touch there too"
         if worst.share > max(NOTABLE, first.share):

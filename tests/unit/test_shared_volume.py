@@ -89,7 +89,7 @@ def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(
     if not share:
         corners = single(EDGE).points[None]
         (depth,) = penetration(corners, corners + np.array([shift, 0.0, 0.0]))
-        words = f"{1e3 * depth:.3g} mm within each other at t = 0 s"
+        words = f"overlapped by {1e3 * depth:.3g} mm at t = 0 s"
     with pytest.warns(UserWarning, match=words):
         report = simulate(scene, **asked).report
     assert [words in sentence for sentence in report.needs] == [True]
