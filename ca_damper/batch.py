@@ -53,8 +53,7 @@ _ROUNDS_A_PLACE = 24
 class Batch(LoadedScenes):
     """A filling, a table of scenes and the container's mount, ready to run.
 
-    The lower level below ``frequency_response``, ``shake`` and ``film``. A batch compiles nothing
-    where one of the same structure has run before.
+    Below ``frequency_response``, ``shake`` and ``film``. A known structure compiles nothing.
 
     Parameters
     ----------
@@ -67,8 +66,7 @@ class Batch(LoadedScenes):
         scene [s], which is shortened so that a whole number of steps makes a cycle of the base.
     mount : str, default "spring"
         ``"spring"``: on spring and dashpot. ``"base"``: moves like the base whatever the filling
-        does. ``"floor"``: rests on the base by its weight, on a stiffness and damping that never
-        pull.
+        does. ``"floor"``: rests on the base, on a stiffness and damping that never pull.
     measured_cycles : int, default 1
         Largest number of cycles that one run may measure.
     rtol : float, default 1e-09
@@ -84,17 +82,14 @@ class Batch(LoadedScenes):
     recorded_samples : int, default 0
         Largest number of samples that a run may record for ``time_series``.
     structure : ModalMount, optional
-        Places of structures given by their modes, see ``shake_structure``; None for a container of
-        its own in each scene.
+        Places of structures given by modes (``shake_structure``); None: single containers.
     if_diverged : str, default "nan"
-        ``"nan"``: if a scene diverges, its results are nan, a warning names it, and the others
-        continue. ``"raise"``: it ends all.
+        ``"nan"``: a scene that diverges has nan as results. ``"raise"``: it ends all.
 
     Attributes
     ----------
     diverged : ndarray
-        Scenes that diverged, with all on the same structure, bool, shape (scenes,);
-        ``divergences()`` tells when and why.
+        Scenes that diverged, with all on the same structure, (scenes,); see ``divergences()``.
     run_seconds : float
         Wall time spent on stepping [s].
     compile_seconds : float
@@ -186,8 +181,7 @@ class Batch(LoadedScenes):
         ----------
         start : str, default "rest"
             ``"rest"``, the steady state of the ``"empty"`` container, or that of a container with
-            the particles as a ``"rigid"`` mass. Only ``"rest"`` for other excitations than a single
-            sine.
+            the particles as a ``"rigid"`` mass; only ``"rest"`` unless the base is a single sine.
         displacement : float or array_like, default 0.0
             Displacement of the container beside that [m], one number or (scenes,).
         velocity : float or array_like, default 0.0
@@ -195,8 +189,7 @@ class Batch(LoadedScenes):
 
         Notes
         -----
-        A UserWarning says where the filling is known to fail on a scene, and where samples of the
-        excitation are too few for the structure.
+        A UserWarning says where the filling is known to fail, or samples are too few.
         """
         coupling = self.engine.coupling
         choice("start", start, starts_of(self.excitation, self.mount))

@@ -1,10 +1,8 @@
 """Release a box of grains beside a rigid mass of the same weight, and count the cycles.
 
-A container hangs on a spring and is released 30 mm above its rest. The particles in it fly, fall
-and hit its walls. Beside it hangs one with as many fixed particles. Nothing shakes them, so a
-shifted resonance plays no part: a faster decay is damping. The particles damp as long as the
-container's peak acceleration is above about 1 g; below it they lie on the floor, and the
-structure's own damping is left. Try other numbers of particles and other amplitudes.
+A container on a spring is released 30 mm above its rest, beside one whose particles are fixed.
+Nothing shakes them, so a faster decay is damping. The particles damp while the container's peak
+acceleration is above about 1 g; below it they lie on the floor.
 
     python -m ca_damper demo
     python -m ca_damper demo --particles 50 --amplitude 40
@@ -12,12 +10,10 @@ structure's own damping is left. Try other numbers of particles and other amplit
     python -m ca_damper demo --compare          # figures of both
     python -m ca_damper demo --all-pictures     # also a page that plays the film
 
-Figures are medians over nine starts, five in a quick run. An amplitude is sqrt(2) times the RMS
-displacement of a cycle of the empty container.
+Figures are medians over nine starts; an amplitude is sqrt(2) times the RMS of an empty cycle.
 
 Writes damper.gif, decay.png, decay.csv, report.json and summary.json to results/damper_demo/;
-with --all-pictures also view.html, which plays the film; with --no-pictures neither picture nor
-film.
+with --all-pictures also view.html, which plays the film; with --no-pictures no picture or film.
 """
 
 import textwrap

@@ -42,8 +42,7 @@ class Action:
     impulse: of the impacts, along x [N s]. carried: mass that moves as one with the container [kg].
     Over the step the container obeys
     (M + carried) x'' + C x' + K x = K y + C y' + impulse / dt - carried g.
-    The mass is carried in place of the force of the last step, as a force that lags by dt damps
-    like N m w^2 dt.
+    The mass is carried instead of last step's force, whose lag dt would damp like N m w^2 dt.
     """
 
     impulse: ti.f64
@@ -274,10 +273,8 @@ class Filling(Protocol):
 class DeviceFilling(Protocol):
     """A filling on the device, for all scenes of a table; data oriented.
 
-    Of its members ``upload``, ``uses`` and ``snapshot`` are Python, the others ti.funcs.
-    ``table.dt`` may change between two steps, when a sweep goes on to its next frequency. It may
-    have one further member, in Python: ``first_steps(effects)``, the step in which each effect
-    first acted in each scene, infinite if never, as of ``recorder.EventCounts``.
+    ``upload``, ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt`` may change
+    between two steps. ``first_steps(effects)``, in Python, may say when each effect first acted.
 
     A filling whose impacts depend on the recoil of the container splits ``advance``, so that boxes
     on one structure resolve their impacts together: ``find_blows(s, step, motion)`` returns Blows,

@@ -1,7 +1,6 @@
 """Goals: outputs of a damper for ``solve_response``, which finds them to a tolerance.
 
-A user-defined goal takes a few lines; its function gets a Response of one particle number and
-returns one value for each seed, or a row of values:
+A user-defined goal gets a Response of one particle number and returns a value or row a seed:
 
     largest_swing = Goal("largest swing", "m", lambda found: found.amplitude[0].max(0), "extreme")
 """
@@ -31,14 +30,11 @@ class Goal(BaseGoal):
     unit : str
         Unit of the output, ``"1"`` for none.
     function : callable
-        Function of a Response of one particle number, with as many seeds as there are runs; returns
-        an array (seeds,) or (seeds, places).
+        Function of a Response of one particle number; returns (seeds,) or (seeds, places).
     kind : str, default "value"
-        ``"value"``: at given frequencies. ``"extreme"``: at the peak of the curve. ``"curve"``: a
-        value for each of the given frequencies.
+        ``"value"``, ``"extreme"`` (at the peak) or ``"curve"`` (at each frequency).
     ratios : tuple of float, default ()
-        Frequency ratios f/f0 [-] that the goal needs; none for an ``"extreme"``, whose Response has
-        at least three around the highest RMS.
+        Frequency ratios f/f0 [-] that the goal needs; none for an ``"extreme"``.
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("value", "extreme", "curve")

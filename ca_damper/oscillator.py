@@ -124,8 +124,7 @@ class Oscillator:
         Returns
         -------
         tuple of (float, float)
-            Ratio of the frequency to the natural one of the empty container [-], and RMS
-            displacement [m], infinite without damping.
+            Frequency ratio [-] and RMS displacement [m], infinite without damping.
 
         Notes
         -----

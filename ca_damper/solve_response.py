@@ -74,8 +74,7 @@ def solve_response(
     Raises
     ------
     InputError
-        The question is invalid, the peak is outside ratios, or the budget ends before there is an
-        answer.
+        The question is invalid, the peak is outside ratios, or the budget ends too early.
     SimulationDiverged
         No step that was tried is stable.
 

@@ -8,11 +8,9 @@ angular frequencies w_k and damping ratios z_k, phi^T M phi = 1, the modal coord
 
     p_k'' + 2 z_k w_k p_k' + w_k^2 p_k = G_k (2 z_k w_k y' + w_k^2 y) + sum_i phi_ik F_i
 
-with G = phi^T M 1 and forces F_i at the places, which are at x = phi p + r y, r = 1 - phi G. All
-modes together leave r = 0. Where some are left out, r y is their share in a translation of all:
-the motion relative to the base, x - y = phi (p - G y), has then the modes that are kept and no
-others, and a base that moves slowly still takes all places along. What is lost is the flexibility
-that the others lend to a place where a force acts, and their resonances.
+with G = phi^T M 1 and forces F_i at the places, which are at x = phi p + r y, r = 1 - phi G, zero
+with all modes. Without some, r y is their share in a translation: a base that moves slowly still
+takes all places along. What is lost is their flexibility and their resonances.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,6 @@
 """Blast the paper's block of concrete from its hole, and draw how it breaks.
 
-The scene of Konno et al., section 4. Expect a crushed zone at the hole, cracks that run out from
-it, and a wedge pushed out of the free face on the right.
+Expect a crushed zone at the hole, cracks that run out from it, and a wedge at the free face.
 
     python -m taichi_dem demo
     python -m taichi_dem demo --out mine         # pictures and tables into ./mine

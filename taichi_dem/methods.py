@@ -35,8 +35,7 @@ class Method:
 def structure_of(method: Any) -> Hashable:
     """Parts of a method on which its kernels depend: all but its numbers.
 
-    A user-defined method may have a member ``structure``; else any change of its numbers compiles
-    anew, as kernels may contain them.
+    A user-defined method may have a member ``structure``; else any change of its numbers compiles.
     """
     if type(method).__module__ != __name__:
         return getattr(method, "structure", (type(method), repr(method)))
@@ -106,13 +105,11 @@ class Uniform(_Explicit):
     dt0 : float, default 1e-08
         Largest step [s].
     distance : float, optional
-        Displacement limit l [m]: no body may move further in a step, so the fastest body sets the
-        step of all. None: the step is always dt0.
+        Displacement limit l [m]: the fastest body sets the step of all. None: it is always dt0.
     control : StepControl, optional
         Further limits of the step.
     dashpot : str, default "full"
-        ``"full"``, or ``"limited"``: a dashpot keeps the share of its coefficient that is stable at
-        the steps of its bodies.
+        ``"full"``, or ``"limited"``: weaken each dashpot just enough to be stable.
     """
 
     dt0: float = 1e-8
@@ -130,12 +127,10 @@ class Multirate(_Explicit):
     dt0 : float, default 1e-08
         Largest step [s].
     distance : float, default 1e-08
-        Displacement limit l [m]: the step of a body is the largest dt0 / 2^k in which it moves by
-        no more.
+        Displacement limit l [m]: a body takes the largest dt0 / 2^k in which it moves by no more.
     neighbour : str, default "held"
         ``"held"``: a body between its own times stays at its last position (the paper).
-        ``"drifted"``: it drifts to every time at which one of its bonds or contacts is evaluated,
-        and takes the impulse at once.
+        ``"drifted"``: it drifts to every evaluation, and takes the impulse at once.
     control : StepControl, optional
         As in ``Uniform``.
     dashpot : str, default "full"
@@ -168,8 +163,7 @@ class ImplicitDashpots(Method):
         scene; slow motion beside very fast bodies needs a smaller one.
     theta : float, default 0.5
         Time in the step, as a share of it, at which bond dashpots take their velocity: from 0.5
-        (mean of both ends, second order) to 1 (the end, first order, for steps so long that the
-        mean would oscillate).
+        (mean of both ends, second order) to 1 (the end, first order, for very long steps).
     refresh : float, default 3e-05
         Interval between updates of the solved blocks of bonds [s].
     """

@@ -30,8 +30,7 @@ def needed_effects(result: Result, tolerance: float = ROUNDING) -> EffectTable:
         Result of ``simulate``.
     tolerance : float, default ROUNDING
         Largest difference of recorded values that counts as equal, as a share of the largest value,
-        from 0 to 1; by default that of rounding. With a larger one, effects that took less than
-        this share of the energy are tried too.
+        from 0 to 1; by default that of rounding. Effects with less energy are tried too.
 
     Examples
     --------

@@ -60,8 +60,7 @@ class Every:
     samples : int, optional
         Number of rows of the time series between calls.
     wall_s : float, optional
-        Wall time between calls [s]; these calls come between any two steps, when bodies may be at
-        different times.
+        Wall time between calls [s], between any two steps; bodies may then be at different times.
 
     Examples
     --------

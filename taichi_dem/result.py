@@ -62,11 +62,9 @@ class Result:
     diverged : str, default ""
         Error message of a run that diverged, whose data end before that; else ``""``.
     start : dict, optional
-        Motion that was set before the run, arguments of ``State.set_motion``; None for that of the
-        scene.
+        Motion set before the run, arguments of ``State.set_motion``; None: the scene's.
     acting_since : dict, optional
-        With effects="auto": time from which each effect acted on each body [s], by name; NaN for
-        never.
+        With effects="auto": when each effect began to act on each body [s], by name; NaN: never.
     receivers : mapping, optional
         Motion of the points of the ``Receivers`` among the observers, a ``Received`` each, by name.
     """
@@ -151,8 +149,7 @@ class Result:
         Returns
         -------
         pandas.DataFrame
-            Masses, sizes, places, velocities, spins and energies, a row a fragment, the heaviest
-            first (``taichi_dem.output.fracture.fragments_of``).
+            Masses, sizes, places, velocities, spins and energies, a row a fragment, heaviest first.
         """
         of_body = self.fragment_of_body(frame)
         return data_frame(fragments_of(self.model, self.frame(frame), of_body))
@@ -173,8 +170,7 @@ class Result:
         Parameters
         ----------
         frame : int
-            Number of the frame in which ``aperture_m`` is measured, the last by default; NaN for a
-            result without frames.
+            Frame that ``aperture_m`` is of, the last by default; without frames it is NaN.
         """
         unknown = np.full(self.model.bond_count, np.nan)
         apertures = self.apertures(frame) if self.frames else unknown
@@ -222,8 +218,7 @@ class Result:
         pandas.DataFrame
             ``time_s``; ``given_J``: work of loads and supports, energy injected at releases and
             held at the start; and a column ``NAME_share`` of each other term, ``residual_share`` of
-            what is unexplained. Shares add up to 1 by the balance; where nothing is given they are
-            NaN.
+            what is unexplained. Shares add up to 1; where nothing is given they are NaN.
         """
         history, time_s = self.series, self.series["time_s"]
         held = sum(history[f"{name}_J"][:1].sum() for name in HELD)
@@ -254,8 +249,7 @@ class Result:
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.
 
         With receivers, receivers.csv too. The series, in paraview/ of that folder, has the folder's
-        name. These files of an earlier run in the same folder are replaced, its series removed even
-        where this run has no frames.
+        name. These files of an earlier run in the same folder are replaced.
 
         Parameters
         ----------
@@ -284,14 +278,12 @@ class Result:
         path : file name, optional
             Of the page; by default ``view.html`` in a new folder for temporary files.
         open_browser : bool, optional
-            By default only from a terminal of a desktop: not in a pipe, a test, a notebook or on a
-            build server.
+            By default only from a terminal of a desktop.
 
         Notes
         -----
         Displacements and rotations have 16 bits: an error of at most 1/65534 of the largest in
-        their frame. A page of the paper's block with 50 frames has 1.2 MB. Beyond 30 MB frames are
-        left out evenly, and the page says so.
+        their frame. 50 frames of the paper's block have 1.2 MB; beyond 30 MB frames are left out.
         """
         # Imported here, so that matplotlib loads only where something is shown.
         from taichi_dem.viewer.block import show_block

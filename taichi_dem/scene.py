@@ -58,20 +58,17 @@ class Scene(Pictured):
         With ``"auto"`` or ``"all"``: loads, supports, and laws in place of the usual ones.
     sleep : float, optional
         With ``"auto"``: share below which a body's neighbours sleep, of the opening at which a law
-        of the bond between them begins, and of the mean speed of their connected part. None: 1e-6;
-        at most 0.01, 0 for no sleep.
+        of their bond begins, and of their part's mean speed. None: 1e-6; at most 0.01, 0: none.
     unbonded : iterable of str, default ()
         Names of groups of inner faces without bonds from the start, as a notch or an open joint.
         Both sides are free, and touch as broken faces do.
     weaker : mapping, optional
         Share of the area of its faces that is bonded, above 0 and at most 1, by the name of a group
         of inner faces. Stiffness, damping, strength, cohesion and fracture energy per area of the
-        face are that share of the material's; openings at the limits and the friction angle do not
-        change.
+        face are that share of the material's; openings at the limits and the friction angle stay.
     materials : mapping, optional
         Material of the bodies of a group by the name of a body group; all other bodies have
-        ``material``. ``body_materials.joined`` has the rule for bonds and contacts between two of
-        them.
+        ``material``. ``body_materials.joined`` has the rule for bonds and contacts between two.
     velocity : array_like or mapping or function, optional
         Velocities of the bodies at the start [m/s]: a vector for all, a vector by body group
         (``Mesh.body_groups``; other bodies are at rest), a row for each body, (body_count, 3), or a
@@ -83,12 +80,10 @@ class Scene(Pictured):
     stress : sequence of float, optional
         Stress at the start, components xx, yy, zz, xy, yz and zx [Pa], compression negative: every
         bond begins with its traction. Supports hold it, and quiet boundaries, which get a
-        ``Traction`` of it; any other face is free, as if rock had just been taken away there. None:
-        no stress.
+        ``Traction`` of it; any other face is free, as if just cut. None: no stress.
     strength : array_like or function, optional
         Strength of each bond over that of the material, (bond_count,), or a function of the middles
-        of their faces [m], (bond_count, 3), that returns it; times ``Material.strength_spread``.
-        None: 1.
+        of their faces [m], (bond_count, 3), that returns it; times ``strength_spread``. None: 1.
     seed : int, default 0
         Seed of ``Material.strength_spread``, 0 to 2147483647.
 

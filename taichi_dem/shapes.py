@@ -80,8 +80,7 @@ def beam(
     element : float
         Length of an edge [m], at most the smallest of them.
     slit : sequence of float, optional
-        Middle, depth and width (x, depth, width) of a slit from the bottom upward through the whole
-        width [m], at least half an element wide.
+        (x, depth, width) of a slit from the bottom up [m], at least half an element wide.
     scatter : int, optional
         Seed of an unstructured mesh, 0 to 2147483647: without rows that cracks would follow.
 
@@ -151,11 +150,9 @@ def plate(
     element : float
         Length of an edge [m], at most the width, the height and the thickness.
     hole : float or sequence of float, optional
-        Centre and diameter (x, y, diameter) of a round hole through the thickness [m]; one number
-        is the diameter of a hole in the middle.
+        (x, y, diameter) of a round hole through the thickness [m]; a number: one in the middle.
     slit : sequence of float, optional
-        Middle, depth and width (x, depth, width) of a slit from the bottom upward through the whole
-        thickness [m], at least half an element wide.
+        (x, depth, width) of a slit from the bottom up [m], at least half an element wide.
     scatter : int, optional
         Seed of an unstructured mesh, 0 to 2147483647: without rows that cracks would follow.
 
@@ -185,8 +182,7 @@ def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
     element : float
         Length of an edge [m].
     scale : float, default 1.0
-        Length of one unit of an STL file, which has none, such as 0.001 for mm [m]. Lengths of a
-        STEP file are converted to metres.
+        Length of one unit of an STL file, such as 0.001 for mm [m]; STEP files have units.
 
     Returns
     -------
@@ -197,8 +193,7 @@ def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
     Raises
     ------
     InputError
-        The file is missing, cannot be read, or is not closed, or gmsh is not installed:
-        ``pip install gmsh``.
+        The file is missing, unreadable or not closed, or gmsh is not installed.
 
     Examples
     --------

@@ -76,19 +76,16 @@ def simulate(
         Number of evenly spaced snapshots after the one at the start.
     progress : callable or str or None, default "auto"
         ``"auto"``: a bar on a terminal and in Jupyter, elsewhere lines. None: silence. A function
-        is called with a Progress, also while kernels are compiled, about five times a second;
-        ``print`` prints percent and time left.
+        gets a Progress about five times a second; ``print`` prints percent and time left.
     title : str, default "simulating"
         Title of the progress bar.
     output : path, optional
         Folder for the result; it is written at the end, up to the last good sample if the run
         diverges, and up to the failure of an observer or a checkpoint.
     checkpoint : Checkpoint, optional
-        Where and when the run saves itself; it also does so at its end and on Ctrl-C, SIGTERM,
-        SIGHUP, SIGXCPU and SIGUSR1.
+        Where and when the run saves itself, besides its end, Ctrl-C and signals of batch systems.
     resume : path, optional
-        Checkpoint to continue from, of the same scene and method; the bits are those of an
-        uninterrupted run.
+        Checkpoint to continue from, of the same scene and method; the bits stay the same.
     observers : sequence of Observer, default ()
         Observers, called during the run with a ``RunView``; after a resume, at the remaining times.
 

@@ -54,16 +54,14 @@ class Simulation:
     method : Method
         Method, from ``taichi_dem.methods``.
     driver : str, default "auto"
-        ``"resident"``, ``"parallel"``, or ``"auto"``: parallel on a GPU, and from
-        10,000 bonds on with several threads.
+        ``"resident"``, ``"parallel"``, or ``"auto"``: parallel on a GPU, or from 10,000 bonds on.
 
     Attributes
     ----------
     model : Model
         Arrays of the scene.
     cut_short : str
-        What an exception or Ctrl-C interrupted, in words; its bits would then differ from an
-        undisturbed run. ``""`` otherwise.
+        What interrupted a step, in words, after which bits differ; ``""`` otherwise.
     run_seconds, run_cpu_seconds : float
         Wall and CPU time spent in steps so far [s], without compiling and without readings.
 
@@ -138,8 +136,7 @@ class Simulation:
         Returns
         -------
         ndarray
-            Its values; of a field with an entry a body, bond, unit, face or sphere, those of the
-            scene.
+            Its values; of a field with an entry a body, bond, unit, face or sphere, the scene's.
         """
         return self.engine.values(field)
 

@@ -50,8 +50,7 @@ def solve(
         Plan of an answer for a similar scene: start at the steps that sufficed there.
     sources : iterable of str, default ("step",)
         Sources of error to measure and include in the bar: ``"step"``, always; ``"contact"``,
-        against a contact law of finer resolution; ``"mesh"``, over other meshes. Others are named
-        as not measured.
+        against finer rays of contact; ``"mesh"``, over other meshes. Others stay unmeasured.
     meshes : iterable of Mesh, optional
         Other meshes of the same body and size, at least two, for the source ``"mesh"``.
     progress : callable or str or None, default "auto"
@@ -60,8 +59,7 @@ def solve(
     Returns
     -------
     Answer
-        Value, error bar, its sources and cost; ``shortfall`` tells why a bar is too wide, and what
-        would help.
+        Value, error bar, its sources and cost; ``shortfall`` tells why a bar is too wide.
 
     Raises
     ------

@@ -76,13 +76,11 @@ class Automaton:
     particle_mass : float, default 0.0002
         Mass of a particle [kg].
     gravity : float or tuple of (float, float), default 10.0
-        Gravity [m/s^2]: downwards, or (to the right, downwards) for a box that lies or is tilted,
-        for rules of place only.
+        Gravity [m/s^2]: downwards, or (to the right, downwards), for rules of place only.
     v_max : float, default 5.0
         Largest particle speed to expect [m/s]. It bounds the step: dt < width / v_max.
     start : tuple of (int, int), optional
-        (column, row) of every particle, counted from 0 at the lower left. None: cells are drawn
-        from the seed of the scene.
+        (column, row) of every particle, from 0 at the lower left. None: drawn from the seed.
     traversal : str, default "list"
         ``"list"`` of particles or ``"scan"`` of all cells; both give the same bits.
     """

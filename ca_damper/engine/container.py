@@ -1,11 +1,9 @@
 """Motion of the containers on one structure: a group of scenes that begins with ``first(s)``.
 
-A structure of n modes carries the boxes of a group; an oscillator has one mode, in which the whole
-container moves, and the base has none. The ti.funcs of a container, in the order in which a run
-calls them: ``start(s, x, v)`` of every scene, then ``complete_start(first)``; in a step
-``motion(s)`` at its beginning, ``set_action(s, action)`` of every filling, and ``advance(first)``,
-which returns the attempts of the integration, or -1. ``renew(s)`` follows a change of the base's
-motion, between two frequencies of a sweep.
+A structure of n modes carries the boxes of a group; an oscillator has one mode, the base none.
+A run calls ``start(s, x, v)`` of every scene, then ``complete_start(first)``; in a step
+``motion(s)``, ``set_action(s, action)`` of every filling, and ``advance(first)``, which returns the
+attempts of the integration, or -1. ``renew(s)`` follows a change of the base's motion.
 """
 
 import numpy as np
@@ -29,8 +27,7 @@ class Container:
 
     state, slope: coordinates and speeds of the modes, and their change. struck: share of the
     present accelerations that is due to impacts [m/s^2]. impulse [N s] and carried [kg]: action of
-    the filling of each scene in the present step. tolerance: local error allowed, rtol and atol,
-    the latter in m and m/s.
+    the filling of each scene in the present step. tolerance: local error allowed, rtol, atol.
     """
 
     def __init__(

@@ -98,8 +98,7 @@ class LoadedScenes:
         dict
             Arrays (scenes,) by name: time_s [s]; x [m], v [m/s], a [m/s^2] of the container; y [m]
             of the base; force [N], mean of the filling on the container in the last step; energy
-            [J] and momentum [kg m/s] of the particles. NaN but for the time where a scene has
-            diverged.
+            [J] and momentum [kg m/s] of the particles. NaN but for the time in a diverged scene.
         """
         self._check_started()
         values = np.empty((len(measures.SAMPLE), self.count))
@@ -114,8 +113,7 @@ class LoadedScenes:
         -------
         dict
             Arrays (samples, scenes) by name: time_s [s]; x [m], v [m/s] of the container; y [m] of
-            the base; force [N] of the filling on the container, mean since the sample before. All
-            of a scene that has diverged are NaN.
+            the base; force [N] of the filling on the container. NaN in a diverged scene.
         """
         if self._recording is None:
             raise InputError("record_every of a run must be at least 1 before time_series, got 0")

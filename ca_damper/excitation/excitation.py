@@ -24,8 +24,7 @@ class Excitation:
     Parameters
     ----------
     base : Signal, optional
-        Displacement of the base [m]; None for the sine of the scenes' table (in ``shake``: a base
-        at rest).
+        Displacement of the base [m]; None: the sine of the table (in ``shake``: a base at rest).
     force : Signal, optional
         Force on the container [N], upwards; None for no force.
     """

@@ -46,8 +46,7 @@ def sines(
     phases : float or sequence of float, default 0.0
         Phases [rad]. Frequencies, amplitudes and phases are broadcast against each other.
     of : str, default "value"
-        ``"value"`` or ``"acceleration"``: what the amplitudes belong to. The value has the
-        amplitude of the acceleration over -(2 pi frequency)^2.
+        ``"value"`` or ``"acceleration"``: what the amplitudes belong to.
 
     Examples
     --------
@@ -97,8 +96,7 @@ def sweep(
     way : str, default "linear"
         ``"linear"``: equal Hz in every second; ``"logarithmic"``: equal octaves in every second.
     of : str, default "value"
-        ``"value"`` or ``"acceleration"``: what keeps its amplitude, the latter but for the slow
-        change of the frequency.
+        ``"value"`` or ``"acceleration"``: what keeps its amplitude, the latter nearly.
     """
     low, high, amplitude = (
         positive("low", low),
@@ -137,8 +135,7 @@ def random_vibration(
         Break points of the density [Hz], ascending.
     density : sequence of float
         One-sided power spectral density at the break points [unit^2/Hz], with the unit of the
-        acceleration, m/s^2, or of the value; straight lines between them in a doubly logarithmic
-        diagram, zero outside.
+        acceleration, m/s^2, or of the value; straight in log-log axes between them, zero outside.
     duration : float
         Duration [s].
     seed : int, default 1

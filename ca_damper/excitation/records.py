@@ -40,8 +40,7 @@ def from_csv(
 
     Columns are separated by tabs, semicolons or commas; with the first two, decimals may have a
     comma. The first line that is not empty and does not begin with "#" names them, such as time_s,
-    "Time [ms]", displacement_mm, "Vel (cm/s)" or "Acc (g)"; without a unit a time counts in
-    seconds.
+    "Time [ms]", displacement_mm, "Vel (cm/s)" or "Acc (g)"; times without a unit are seconds.
 
     Parameters
     ----------

@@ -3,8 +3,7 @@
 Between samples of any kind, the quantity is the cubic spline through them. It follows a component
 that is sampled at least four times a cycle: its gain sinc^4(f) 3 / (2 + cos(2 pi f)), f by the
 sampling rate, is then within 1.5 % of 1, at eight times within 0.06 %, and the image at 1 - f has
-at most 1.3 % of its amplitude. So 99 % of the samples' power must lie below a quarter of the
-sampling rate.
+at most 1.3 % of its amplitude. So 99 % of the power must lie below a quarter of that rate.
 
 Accelerations and velocities are integrated from nodes that lie closer than their samples. Straight
 lines from node to node of an acceleration lose (w h)^2 / 12 of a component, 5 % of one with eight

@@ -95,8 +95,7 @@ class Certificate(BaseCertificate):
     periods : Periods, optional
         Periodicity of the motion; None where fewer than two cycles were measured.
     checked : CheckedRange, optional
-        Range in which the filling was checked, and what of the run lies outside; None where the
-        filling names none.
+        Range in which the filling was checked, and what of the run lies outside; None: no range.
     """
 
     effects: str
@@ -128,8 +127,7 @@ class Driven(NamedTuple):
     """What is known of scenes before they run, (scenes,) each.
 
     particles: numbers. mass: of what a blow moves [kg], infinite for a container that is driven.
-    amplitude [m] and acceleration [m/s^2] of a container that moves as a sine of its base, NaN of
-    others.
+    amplitude [m] and acceleration [m/s^2] of a container driven by a sine of its base, else NaN.
     """
 
     particles: np.ndarray

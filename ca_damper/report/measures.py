@@ -5,8 +5,7 @@ y = y0 sin(w t) has Y = -i y0. X comes from n samples at the beginnings of steps
 over steps, which belong to their middles and stand lower by sinc(w dt / 2): divided out.
 
 The filling answers the container's speed V with the force F = -(c + i w m) V: this defines its
-apparent damping c [N s/m] and apparent mass m [kg], and it takes the mean power c |V|^2 / 2. The
-complex power F conj(V) / 2 holds both. A mass fixed to the container has c = 0 and m = its mass.
+apparent damping c [N s/m] and apparent mass m [kg], and it takes the mean power c |V|^2 / 2.
 """
 
 from dataclasses import dataclass

@@ -22,13 +22,11 @@ class SceneFrame:
     y : float
         Displacement of the base [m].
     position : ndarray
-        Positions of the particles, horizontal and vertical, as the ``snapshot`` of the filling [m],
-        shape (particles, 2).
+        Positions of the particles, horizontal and vertical [m], shape (particles, 2).
     velocity : ndarray
         Velocities of the particles [m/s], shape (particles, 2).
     diameter : ndarray, optional
-        Diameter of each particle [m], shape (particles,), where they are of several sizes; else
-        None.
+        Diameter of each particle [m], (particles,), of several sizes; else None.
     """
 
     time_s: float

@@ -38,8 +38,7 @@ class Report:
         Longest step that the filling allows or advises [s], and why; None where any does. Of
         several fillings that of which a scene takes the largest share.
     momentum_error : float
-        Momentum of the particles that no impulse explains, as a share of what they and the
-        container exchanged, in the worst scene.
+        Momentum that no impulse explains, as a share of that exchanged, in the worst scene.
     scene_steps : int
         Number of steps of all scenes.
     particle_steps : int
@@ -205,8 +204,7 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> EffectTable:
     result : Response or Report
         Result of ``frequency_response``, or the report of a batch.
     tolerance : float, default 0.001
-        Share of the energy taken (friction) or in motion (rotation) below which an effect is
-        negligible, from 0 to 1.
+        Share of the energy taken (friction) or in motion (rotation) that is negligible, 0 to 1.
 
     Notes
     -----

@@ -1,9 +1,8 @@
 """End of the transient, and error of the mean, from values cycle by cycle.
 
 The beginning is cut off where the standard error of the rest is least (rule MSER). A t test then
-compares the halves of the rest, by the spread of the seeds, or of few seeds by that of an
-autoregressive series without its trend. Where they differ, three thirds give the limit of an
-exponential approach. A change that takes longer than the series is not seen.
+compares the halves of the rest, by the spread of the seeds, or of an autoregressive series. Where
+they differ, three thirds give the limit of an exponential approach.
 """
 
 import math

@@ -166,8 +166,7 @@ def best_damper(
     """Find number and size of grains, and the clearance, that damp a motion best.
 
     All boxes are looked at briefly, the best of them again with more frequencies, cycles and seeds.
-    A second filling then confirms the winner, and shifts clearance, number and size of its grains
-    by the tolerance.
+    A second filling then confirms the winner, and shifts its clearance and grains by the tolerance.
 
     Parameters
     ----------
@@ -184,8 +183,7 @@ def best_damper(
     density : float
         Density of a grain [kg/m^3]; that of the default grains if not given.
     goal : str, default "peak"
-        ``"peak"`` or ``"rms"`` of the displacement from the base under a Signal; for sines both are
-        the largest RMS over the frequencies.
+        ``"peak"`` or ``"rms"`` of the displacement from the base; for sines the largest RMS.
     tolerance : float, default 0.1
         Share by which clearance, number and size may be off.
     seeds : int, default 5

@@ -45,8 +45,7 @@ _UNITS |= dict.fromkeys(("loss", "mass_share", "energy"), "1")
 class DamperMap(ScenesResult):
     """Measures of a container that is driven as A sin(2 pi f t), whatever its filling does.
 
-    The axes of all measures are clearances, particles, amplitudes, frequencies, seeds, in this
-    order.
+    Axes of all measures: clearances, particles, amplitudes, frequencies, seeds.
 
     Parameters
     ----------
@@ -174,8 +173,7 @@ def damper_map(
     particles : int or sequence of int
         Numbers of particles, one or several.
     clearances : float or sequence of float, optional
-        Distances from the settled grains to the lid [m]; the box is made as high as each needs.
-        None: the box of the filling as it is.
+        Distances from the settled grains to the lid [m]. None: the box of the filling as it is.
     seeds : int or sequence of int, default 3
         Number of seeds, counted from 1, or the seeds themselves.
     dt : float, optional

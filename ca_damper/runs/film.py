@@ -64,8 +64,7 @@ class Film:
         scenes : sequence of int, optional
             Numbers of the scenes shown, at most six; by default the first six.
         open_browser : bool, optional
-            By default it opens where a person sits at a terminal of a desktop: not in a pipe, a
-            test, a notebook or on a build server.
+            By default it opens only from a terminal of a desktop.
         """
         # Imported here, so that matplotlib loads only where something is shown.
         from ca_damper.plot.containers import MOST_SCENES, show_film

@@ -115,8 +115,7 @@ class TimeHistory(MotionHistory):
     def added_damping(self) -> np.ndarray:
         """Coefficient of a dashpot on the base that takes the filling's work [N s/m].
 
-        -int F dx / int (x' - y')^2 dt over the run; samples must be close together. NaN without
-        motion.
+        -int F dx / int (x' - y')^2 dt over the run; samples must be close. NaN without motion.
         """
         work = -(self.force[1:] * np.diff(self.x, axis=0)).sum(axis=0)
         stretch = np.diff(self.relative, axis=0) ** 2

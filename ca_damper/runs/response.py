@@ -47,8 +47,7 @@ _PEAK_COLUMNS = (
 class Response(ScenesResult):
     """Response curves of a filling; every measure is an array (particles, ratios, seeds).
 
-    A notebook shows its curves and a table of the peaks; a peak at an end of the ratios is marked
-    as outside.
+    A notebook shows its curves and a table of the peaks, and marks those at an end of the ratios.
 
     Parameters
     ----------
@@ -201,8 +200,7 @@ class Response(ScenesResult):
 class AmplitudeResponse(Tabulated):
     """A Response for each amplitude of the base, from one batch.
 
-    Returned by ``frequency_response`` for several amplitudes of the base. It has a length, items by
-    number, and can be iterated over.
+    Returned by ``frequency_response`` for several amplitudes of the base, as a sequence.
 
     Parameters
     ----------
@@ -293,11 +291,9 @@ def frequency_response(
     measured_cycles : int, default 20
         Cycles to measure.
     start : str, default "rest"
-        Motion of the container at the beginning: ``"rest"``, ``"empty"`` or ``"rigid"``, see
-        ``Batch.start``.
+        Motion of the container at the beginning: ``"rest"``, ``"empty"`` or ``"rigid"``.
     effects : str, default "listed"
-        ``"listed"`` or ``"auto"``, see ``Batch``; ``report.certificate`` tells which effects acted
-        and which were left out.
+        ``"listed"`` or ``"auto"``, see ``Batch``; ``report.certificate`` tells which acted.
     progress : callable or str or None, default "auto"
         ``"auto"``: a bar on a terminal and in Jupyter, elsewhere lines. None: silence. A function
         is called with a Progress while kernels are compiled, and then six times a second.

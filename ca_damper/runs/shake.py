@@ -82,8 +82,7 @@ def shake(
     interval : float, default 0.001
         Longest time between samples [s]; the measures take all steps into account.
     displacement : float, default 0.0
-        Displacement of the container at the beginning [m]. With an excitation that is zero, the
-        record is a free decay.
+        Displacement of the container at the beginning [m]; without excitation a free decay.
     velocity : float, default 0.0
         Velocity of the container at the beginning [m/s].
     effects : str, default "listed"
@@ -162,8 +161,7 @@ def shake_structure(
     seeds : int or sequence of int, default 5
         Number of seeds, counted from 1, or the seeds themselves.
     dt : float, optional
-        Largest step [s]. None: that of the filling, or a fortieth of a cycle of the highest mode
-        where that is shorter.
+        Largest step [s]. None: the filling's, at most a fortieth of the highest mode's cycle.
     duration : float, optional
         Duration [s]; that of the excitation if None.
     interval : float, default 0.001
@@ -171,8 +169,7 @@ def shake_structure(
     force_place : int, optional
         Place where the force of the excitation acts.
     displacement : float or array_like, default 0.0
-        Displacement of the places at the beginning [m], one number or (places,); a sum of the
-        modes.
+        Displacement of the places at the beginning [m], a number or (places,); a sum of the modes.
     velocity : float or array_like, default 0.0
         Velocity of the places at the beginning [m/s], likewise.
     effects : str, default "listed"

@@ -47,8 +47,7 @@ class SphereBodies:
 
     (horizontal, vertical), in the frame at rest. Horizontal positions count from the middle of the
     box, so that a mirrored run has the same bits. Positions run ``lead`` [s] ahead of the
-    velocities, half a step in a run. floor: where it is at the time of the velocities [m], as
-    foreseen by the last step.
+    velocities, half a step in a run. floor: place at the velocities' time [m], as foreseen.
     """
 
     constant_fields = ("body",)

@@ -1,10 +1,9 @@
 """Contact forces between two spheres, or a sphere and a wall (paper, eqs 3 to 6).
 
 The dashpot follows from the wanted restitution. Two spheres meet head on: m d'' = -max(0, k d^(3/2)
-+ c d^p d'); d: overlap, m: effective mass. In units of the overlap D = (m v^2 / k)^(2/5) and of the
-impact speed v, c becomes the number alpha = c D^(p+1) / (m v): independent of v for p = 1/4, so
-that restitution is one number, and growing with v for p = 1/2, so that it holds at one speed only.
-The contact ends where the force has fallen to zero, before the overlap has: spheres do not pull.
++ c d^p d'); d: overlap, m: effective mass. In units of D = (m v^2 / k)^(2/5) and of the speed v,
+c becomes alpha = c D^(p+1) / (m v): for p = 1/4 restitution is one number, for p = 1/2 it holds at
+one speed only. The contact ends with the force, before the overlap: spheres do not pull.
 """
 
 import math
@@ -42,8 +41,7 @@ class Contact:
 
     reach: distance of a centre from the other, or from the wall, when they touch [m]. yielding:
     half a step over the effective mass [s/kg]. grip: most friction per slip [N s/m]. shear:
-    tangential stiffness over the root of the overlap [N/m^(3/2)]. since: time that positions have
-    moved on [s].
+    tangential stiffness over the root of the overlap [N/m^(3/2)]. since: time moved on [s].
     """
 
     stiffness: ti.f64

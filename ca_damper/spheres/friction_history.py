@@ -19,8 +19,7 @@ _LONG_AGO = -2
 class FrictionHistory:
     """Springs of the contacts of the last step: force [N] and root of the overlap [m^(1/2)].
 
-    recalled: those of the pairs of the present step, zero for new ones. wall_spring: of a sphere at
-    each wall, 2 axis + side.
+    recalled: those of present pairs, zero for new ones. wall_spring: at each wall, 2 axis + side.
     """
 
     def __init__(self, pair_contacts: PairContacts, remembers: bool):

@@ -62,8 +62,7 @@ class Spheres:
         ``"tsuji"``: a dashpot with d^(1/4), d the overlap, for one restitution at every speed.
         ``"printed"``: with d^(1/2) as in eq. (3), for the restitution at ``reference_speed`` only.
     restitution : float, default 0.75
-        Restitution coefficient between spheres, from 0.01 to 1. Not printed in the paper; 0.75 is
-        ours.
+        Restitution coefficient between spheres, from 0.01 to 1; not in the paper, 0.75 is ours.
     wall_restitution : float, default 0.75
         Restitution coefficient between sphere and container, likewise.
     friction : float, default 0.5

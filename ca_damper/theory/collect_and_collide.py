@@ -1,21 +1,18 @@
 """Theory of grains that fly between floor and lid as one block: collect and collide.
 
-Without gravity a shaken container collects its grains on one wall while that wall pushes them, and
-throws them as one block when it begins to slow down, at its largest speed A w and in the middle of
-its way. The block flies at A w until the opposite wall has met it, at the phase p after the throw,
+Without gravity a shaken container collects its grains on one wall and throws them as one block at
+its largest speed A w. The block flies until the opposite wall meets it, at the phase p after that,
 
     p - sin p = gap / A,
 
-and dissipates all of the relative motion, N m (A w)^2 (1 - cos p)^2 / 2, as many collisions among
-the grains leave none of it. If the wall then still speeds up towards the block, p <= pi, it
-collects the block in turn and throws it back half a cycle after the first throw. A cycle so takes
+and dissipates all of the relative motion, N m (A w)^2 (1 - cos p)^2 / 2. If that wall then still
+speeds up, p <= pi, it throws the block back half a cycle after the first throw. A cycle so takes
 
     E = N m A^2 w^2 (1 - cos p)^2.
 
 The motion exists from p = pi on, which is A = gap / pi: there both meet at opposite speeds and E
 jumps to its largest value, 4 N m A^2 w^2; for larger A it falls slowly. Source: Bannerman et al.,
-Phys. Rev. E 84 (2011) 011301; Sack, Heckel, Kollmer, Zimber and Poeschel, Phys. Rev. Lett. 111
-(2013) 018001.
+Phys. Rev. E 84 (2011) 011301; Sack et al., Phys. Rev. Lett. 111 (2013) 018001.
 
 The block's speed over a half cycle is A w up to p and that of the container, A w cos, after it. Its
 first harmonic by that of the container is u - i l with

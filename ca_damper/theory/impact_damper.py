@@ -14,12 +14,10 @@ ceiling at -u and the floor at u, so J = 2 m u. It meets the ceiling at x0 = x(0
 X sin(w t + phase) it follows that X sin(phase) = x0 - J q(0) and w X cos(phase) = v - J q'(0-);
 squares add up to X^2: a quadratic equation for u.
 
-Small changes of a motion follow the Jacobian of its map from impact to impact. Changed are the
-place x and speed v of the container, the velocity p of the grain, all after a blow, and the time t
-of the blow. At T/2 those of x and v have grown to free(T/2) (dx - x' dt, dv - v' dt), that of the
-grain's place to dx + dp T/2 + u dt. The next blow is later by the gap between both over the speed
-at which they meet. It changes velocities by (1 + e) times that speed, shared by the masses; then
-all but the time turns over.
+Small changes of a motion follow the Jacobian of its map from impact to impact, of the place x and
+speed v of the container, the velocity p of the grain, and the time t of the blow. At T/2 those of x
+and v have grown to free(T/2) (dx - x' dt, dv - v' dt), that of the grain's place to
+dx + dp T/2 + u dt. The next blow is later by their gap over the speed at which they meet.
 """
 
 import math

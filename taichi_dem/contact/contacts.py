@@ -32,8 +32,7 @@ class Contacts:
     """Pairs of bodies that may touch soon; p: a slot of the ``PairStore``, called store.
 
     path: bound of the way that any point of a free body has gone [m]; horizon: path up to which its
-    pairs are known [m]: a search is requested before a path reaches it. skin: twice the least body
-    skin.
+    pairs are known [m]: a search comes before a path reaches it. skin: twice the least body skin.
     """
 
     def __init__(self, tables: Tables, state: State):

@@ -9,11 +9,8 @@ Invariants, at any tick between two searches:
 - No path is longer than its horizon: a search is requested before that.
 
 So a search visits the bodies that have come near their horizon or that a break has set free, and
-compares the pairs of which ``until`` lies below the new horizons. Results do not depend on the
-times of searches.
-
-A search that finds no room for what it would list changes no pair and no impulse: made again with
-more room, it gives the same bits.
+compares pairs whose ``until`` lies below the new horizons. The times of searches change no result,
+nor does a search that lacks room.
 """
 
 from typing import Any, Protocol

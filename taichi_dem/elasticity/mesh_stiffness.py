@@ -29,8 +29,7 @@ class MeshStiffness:
     Parameters
     ----------
     compliance : ndarray
-        Strains per stress [1/Pa], shape (6, 6), in the order xx, yy, zz, yz, zx, xy; shear strains
-        as angles.
+        Strains per stress [1/Pa], (6, 6), in the order xx, yy, zz, yz, zx, xy; shear as angles.
     density : float
         Density [kg/m^3].
     """
@@ -120,8 +119,7 @@ def mesh_stiffness(mesh: Mesh, material: AnyMaterial) -> MeshStiffness:
 
     Notes
     -----
-    Among all stress fields in equilibrium this is the most compliant answer: blocks of few elements
-    show some per cent less than large ones.
+    This is the most compliant answer in equilibrium: few elements show some per cent less.
     """
     topology = topology_of(instance("mesh", mesh, Mesh))
     if not hasattr(material, "normal_stiffness"):

@@ -34,10 +34,8 @@ class SimulationDiverged(Portable, RuntimeError):
     result : Result or None
         Result of the run up to its last good sample; None where there is none.
     advice : mapping of float
-        Numbers that the sentence advises, by name: step [s], the largest one of the method;
-        max_speed [m/s] of the scene; contact_stiffness [N/m] or, of whole bodies, normal_stiffness
-        [Pa/m] of the material; of the damper dt [s].
-        A run that follows it may need further advice.
+        Numbers that the sentence advises, by name: step [s] of the method; max_speed [m/s] of the
+        scene; contact_stiffness [N/m] or normal_stiffness [Pa/m]; of the damper dt [s].
     """
 
     advice: Mapping[str, float] = MappingProxyType({})

@@ -22,8 +22,7 @@ from taichi_dem.kit.validation import FileName
 class RunSnapshot:
     """All changing data of a run: fields on the device, and arrays of its owners on the host.
 
-    memory: gives the present ``FieldMemory``. Arrays must match those of an owner's ``example()``;
-    those named in ``grows`` have any length.
+    memory: gives the ``FieldMemory``. Arrays must match those of ``example()``, but for ``grows``.
     """
 
     def __init__(self, identity: Mapping[str, str], memory: Callable, owners: Mapping[str, Any]):

@@ -73,8 +73,7 @@ class Effect:
     def silent(self) -> "Effect":
         """Return a copy that is compiled like this effect and never acts.
 
-        All bits, reports and findings are those of a scene without it, but nothing is compiled
-        anew.
+        All bits, reports and findings are those of a scene without it, but nothing compiles anew.
         """
         if not self.may_be_silent:
             raise InputError(f"effect {self.name} cannot be silent: leave it out of the scene")
@@ -122,8 +121,7 @@ class Effect:
     def accepts(self, given: "Effect") -> bool:
         """Whether kernels compiled for this effect are valid for an effect of a scene.
 
-        They are valid unless an attribute that kernels read has another value, or the effect has
-        another count of numbers.
+        They are valid until an attribute that kernels read, or the count of numbers, changes.
         """
         same = (np.array_equal(getattr(given, k, np.nan), v) for k, v in self._frozen.items())
         return _count_of(given) == self._count and all(same)

@@ -49,8 +49,7 @@ class BodyGeometry(Geometry):
     outer_faces : bool or str, default True
         True: outer faces meet from the start. ``"once_broken"``: from the first break of any bond.
     skin : float, default 0.0075
-        Gap up to which pairs enter the candidate list, as a share of the radius of a body to its
-        corners. It changes time, not results.
+        Gap up to which pairs are candidates, as a share of a body's radius: time, not results.
 
     References
     ----------

@@ -31,8 +31,7 @@ class Softening(TensionLaw):
     Notes
     -----
     Unloading goes to the origin and the elastic limit moves to where it began; compression keeps
-    the full stiffness. One failed unit releases the whole face. Strength and fracture energy are
-    those of the material.
+    the full stiffness. One failed unit releases the whole face.
     """
 
     may_be_silent = True
@@ -249,8 +248,7 @@ class SlipWeakening(ShearSlip):
     The cohesion c of the material is gone at the critical slip d_c = 2 G_II / c; the friction of
     the bond remains. A unit without cohesion that is not pressed transmits nothing and releases the
     face, as one that failed in tension does; pressed faces slide with friction until they open.
-    Slip in both directions accumulates; the strength in tension does not fall with it. The effect
-    is not in the paper.
+    Slip in both directions accumulates; the tensile strength stays. This is not in the paper.
 
     References
     ----------

@@ -1,8 +1,7 @@
 """Cohesive law of bonds whose cracks cost the energy of their plane, whatever faces they follow.
 
-Tractions of a unit without damage, t = (k_n x, k_s s): opening x, sliding s, pressure p on it.
-Where a stress begins to open a plane, a face inclined to it carries less: its direction r = t_n /
-|t| tells by how much, and how much area of the plane it covers. docs/decisions/034 derives it.
+Tractions of a unit without damage, t = (k_n x, k_s s): opening x, sliding s, pressure p on it;
+r = t_n / |t| is the inclination of its face to the crack. docs/decisions/034 derives the law.
 """
 
 import taichi as ti
@@ -221,9 +220,8 @@ def _rubbed(stiffness, limit, sliding, slip):
 def _slipped(stiffness, sliding, before, unit, first, last):
     """Energy per area [J/m^2] of a pressed unit that slip takes, beside what damage spends.
 
-    first, last: slip of its damaged part [m]. The traction is stiffness (sliding - r) with r =
-    damage slip, so that the work is that of r at the mean traction, less what the elastic parts of
-    the unit hold apart from each other.
+    first, last: slip of its damaged part [m]. The traction is stiffness (sliding - r), r = damage
+    slip: the work of r at the mean traction, less what elastic parts hold against each other.
     """
     way = unit[0] * last - before[0] * first
     work = stiffness * dot(sliding - before[0] * first - 0.5 * way, way)

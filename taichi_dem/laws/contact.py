@@ -69,8 +69,7 @@ class SphereContact(LinearContact):
         Equal parts of the edges of a face; 5 gives the paper's six spheres a face.
     outer_faces : bool or str, default True
         True: outer faces carry spheres from the start. ``"once_broken"``: from the first break of
-        any bond. False: only broken faces carry them, as in the paper, and bodies pass through each
-        other elsewhere.
+        any bond. False: only broken faces carry them, as in the paper; others do not touch.
     skin : float, default 0.015
         Gap up to which spheres enter the candidate list, at least, as a share of the radius of a
         body; more where bodies are fast. It changes time, not results.
@@ -113,8 +112,7 @@ class BodyContact(LinearContact):
     stiffness : float, optional
         Stiffness per area [Pa/m]; by default that of a bond of the usual size.
     skin : float, default 0.0075
-        Gap up to which pairs enter the candidate list, as a share of the radius of a body to its
-        corners. It changes time, not results.
+        Gap up to which pairs are candidates, as a share of a body's radius: time, not results.
 
     Notes
     -----

@@ -1,7 +1,6 @@
 """What laws of contact are asked: abstract classes, in which geometry and forces are apart.
 
-m: pair of materials, the row of numbers ``self.law[m, 0]`` and on. k: entry of the pair store, two
-spheres or two bodies.
+m: pair of materials, the row of numbers ``self.law[m, 0]`` and on. k: entry of the pair store.
 """
 
 from abc import abstractmethod
@@ -70,8 +69,7 @@ class Geometry(Effect):
         True: outer faces touch from the start. ``"once_broken"``: from the first break of any bond.
         False: only broken faces touch.
     skin : float
-        Gap up to which an entry is listed, as a share of the extent of a body. It changes time, not
-        results.
+        Gap up to which an entry is listed, as a share of a body's extent: time, not results.
     """
 
     role = "geometry"
@@ -251,8 +249,7 @@ class ContactLaw(Effect):
 class FrictionLaw(Effect):
     """Force across a contact, within a limit.
 
-    With ``remembers`` it keeps a spring for each entry, whose vectors are in the first body's
-    frame; without, ``force`` is all.
+    With ``remembers`` each entry keeps a spring, in the first body's frame; else ``force`` is all.
     """
 
     role = "friction"

@@ -239,8 +239,7 @@ class Support(BodyEffect):
     def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Velocity [m/s] (3,) and angular momentum [kg m^2/s] (3,) that it allows of those given.
 
-        Means over a step [s] with its middle at a time t [s]; a step of 0 asks for the values at
-        that time. rotation: (3, 3), of the body.
+        Means over a step [s] with its middle at a time t [s]; over a step of 0, values then.
         """
 
 

@@ -26,8 +26,7 @@ class MixedMode(DamageLaw):
     ----------
     shear_energy : float
         Fracture energy G_II of pure sliding [J/m^2]; G_I of pure opening is the fracture energy of
-        the material. A scene refuses one of c^2 / (2 shear stiffness) or less, with which a unit
-        would fail at once.
+        the material. G_II must exceed c^2 / (2 shear stiffness), or units would fail at once.
     exponent : float, default 2.0
         Exponent of the law of mixed modes [-], a whole number of quarters from 0.25 to 8.
 

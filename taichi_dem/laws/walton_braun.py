@@ -16,16 +16,14 @@ class WaltonBraun(ContactLaw):
     """A spring that unloads stiffer than it loads: restitution does not depend on speed.
 
     Loading follows ``stiffness``; unloading and loading again ``stiffness / restitution^2``, from
-    the largest overlap so far on. Of what loading has stored, restitution^2 comes back. What
-    touches anew begins anew.
+    the largest overlap so far on, and gives back restitution^2. What touches anew begins anew.
 
     Parameters
     ----------
     restitution : float, default 0.5
         Speed at which two loose bodies part over that at which they met, from 0.05 to 1 [-].
     stiffness : float, optional
-        Stiffness of loading: of bodies per area [Pa/m], by default that of a bond of the usual
-        size; of spheres [N/m], by default the material's.
+        Stiffness of loading, by default a usual bond's [Pa/m]; of spheres the material's [N/m].
     geometry : Geometry, optional
         What touches: whole bodies (``BodyGeometry()``, the default) or ``SphereGeometry()``.
     """

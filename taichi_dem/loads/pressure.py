@@ -237,8 +237,7 @@ class GasPressure(FacePressure):
 
     Notes
     -----
-    The pressure is a squared cosine up to the peak and a cosine down to zero. The area is that of
-    the mesh.
+    The pressure is a squared cosine up to the peak, a cosine down to zero; areas are the mesh's.
 
     References
     ----------
@@ -314,8 +313,7 @@ class ExpandingGas(GasPressure):
     exponent : float, default 1.4
         Adiabatic exponent, a multiple of 0.2 up to 5.
     **pulse
-        Peak, rise, decay_ratio and start of a ``GasPressure``: the pressure over time if the walls
-        stood still.
+        Peak, rise, decay_ratio, start of a ``GasPressure``: the pressure if the walls stood still.
 
     Notes
     -----

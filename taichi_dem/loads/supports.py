@@ -100,8 +100,7 @@ class Fixed(_Support):
 class Roller(_TurningSupport):
     """Bodies with a face in the group slide on its plane and turn about its normal only.
 
-    A body on several planes slides along their common directions, and turns only if all are
-    parallel.
+    A body on several planes slides along common directions, and turns only if all are parallel.
 
     Parameters
     ----------
@@ -113,8 +112,7 @@ class Roller(_TurningSupport):
         Whether bodies turn freely, as on a knife edge: only a point of each keeps to the plane.
     about : sequence, optional
         With turns: a point, or two points of a line [m], where the bodies are held, each at the
-        nearest point of the line. None: the middle line of the group, the middle of a group less
-        than twice as long as wide.
+        nearest point of the line. None: the middle line of the group, of a short one the middle.
     """
 
     def __init__(self, group: str, normal: Sequence[float], turns: bool = False, about: Any = None):
@@ -323,8 +321,7 @@ class QuietBoundary(Ground):
     group : str
         Group of outer faces.
     p_speed : float, optional
-        Speed of compression waves [m/s]; None for that of the bonds near the face
-        (``wave_moduli``).
+        Speed of compression waves [m/s]; None: that of nearby bonds (``wave_moduli``).
     s_speed : float, optional
         Speed of shear waves [m/s]; None likewise.
 
@@ -332,8 +329,7 @@ class QuietBoundary(Ground):
     -----
     Tractions of rho c_p v along the normal of a face and rho c_s v across it, v the velocity of the
     face, are those of a wave that goes on: a wave that meets the face at right angles is absorbed,
-    an oblique one partly reflected. Normals and arms stay those of the mesh, as displacements are
-    small there.
+    an oblique one partly reflected. Displacements must be small: normals and arms are the mesh's.
 
     References
     ----------

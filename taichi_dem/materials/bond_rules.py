@@ -117,8 +117,7 @@ class ModulusOverDistance(BondRule):
 class ShareOfCritical(BondRule):
     """Dashpot of a bond per area [Pa s/m], as a share of the critical one between its two bodies.
 
-    2 ratio sqrt(k m / A) with k = modulus / distance, the mass m = m1 m2 / (m1 + m2) and the area
-    A.
+    2 ratio sqrt(k m / A), k = modulus / distance, mass m = m1 m2 / (m1 + m2), area A.
     """
 
     ratio: float
@@ -134,8 +133,7 @@ class ShareOfCritical(BondRule):
 class FaceStiffness(ContactRule):
     """Stiffness of one sphere contact [N/m]: as stiff as a bond where a face's six spheres touch.
 
-    The median over all faces of a material's bodies of modulus area / (6 distance), the distance
-    twice that of the face from its body's centre.
+    The median over all faces of modulus area / (6 distance), twice that of face and body's centre.
     """
 
     modulus: float

@@ -7,10 +7,8 @@ volumes, and with normals in all directions alike two mean fields bound the modu
   displacements affine, rotations none:  3 K = E_n,  10 G = 2 E_n + 3 E_t,
   tractions uniform, t = sigma n:        3 K = E_n,  1 / G = 4 / (5 E_n) + 6 / (5 E_t).
 
-The first is E_n = E / (1 - 2 nu), E_t / E_n = (1 - 4 nu) / (1 + nu) of microplanes and reaches only
-nu <= 1/4 (Bazant and Oh, J. Eng. Mech. 111 (1985) 559). Tetrahedra follow the second to a tenth,
-since four faces leave a body little to carry but a uniform stress: uniform tractions are in
-equilibrium with every tetrahedron, a lower bound of the stiffness. What they carry beyond it
+The first, of microplanes, reaches only nu <= 1/4 (Bazant and Oh, J. Eng. Mech. 111 (1985) 559).
+Tetrahedra follow the second, a lower bound of the stiffness, to a tenth. What they carry beyond it
 (``_MEASURED``) was found by periodic cells of random tetrahedra, solved in statics.
 """
 
@@ -161,14 +159,12 @@ class Material:
         Volume [m^3] of rock that has this strength in the mean; larger bonds are weaker, smaller
         ones stronger, by the Weibull modulus. 0: all sizes alike.
     coarse : {"refuse", "weaken"}, default "refuse"
-        What a scene does where elements are too large for strength and energy, see
-        ``from_elastic``.
+        What a scene does if elements are too large for strength and energy (``from_elastic``).
 
     Raises
     ------
     InputError
-        A value is not finite, negative, or zero where it must be positive; or a bond would fail
-        before it reaches its strength.
+        A value is out of its range, or a bond would fail before it reaches its strength.
     """
 
     density: float
@@ -240,8 +236,7 @@ class Material:
         cohesion : float
             Cohesion of a bond [Pa].
         damping_ratio : float, default 0.05
-            Share of the critical damping of a bond between its two bodies, and of contacts; 0 for
-            none.
+            Share of the critical damping, of bonds between two bodies and of contacts; 0 for none.
         strength_spread : float, default 0.0
             Relative standard deviation of the strength from bond to bond, see ``Material``.
         strength_volume : float, default 0.0

@@ -43,8 +43,7 @@ def drawn(seed: int, count: int) -> np.ndarray:
 def factors(spread: np.ndarray, reference: np.ndarray, volume: np.ndarray, seed: int) -> np.ndarray:
     """Strength of each bond over the material's, (n,): of mean 1, in bonds of the reference volume.
 
-    spread: relative standard deviation; reference, volume [m3]: of the material, 0 for none, and of
-    the bond; arrays (n,).
+    spread: relative standard deviation; reference, volume [m3]: of material (0: none), bond.
     """
     uniform, found = drawn(seed, len(spread)), np.ones(len(spread))
     for one, size in np.unique(np.stack([spread, reference], axis=1), axis=0):

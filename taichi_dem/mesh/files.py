@@ -60,8 +60,7 @@ def read_mesh(
     weld_tolerance : float, default 0.0
         Points not farther apart than this become one [m]; 0 welds nothing.
     keep_coincident : bool, default False
-        Accept distinct points at one place, and leave the faces on them unbonded, as at a joint or
-        a crack (see ``checked_mesh``).
+        Keep distinct points at one place apart, as at a joint or a crack.
 
     Notes
     -----
@@ -70,8 +69,7 @@ def read_mesh(
     physical volumes; in other formats from sets of solid cells and integer data on them. Elements
     of higher order are read as linear ones. Hexahedra, prisms and pyramids are cut into tetrahedra
     after welding. Groups of points and lines are not read. A UserWarning names what may change
-    results: unread sets of points, cells of types that meshio does not know, and cells that meet
-    but share no face.
+    results: unread points and cells, and cells that meet but share no face.
     """
     scale, path = positive("scale", scale), path_name("path", path)
     raw, printed = _read_raw(path)

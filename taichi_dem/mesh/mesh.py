@@ -34,8 +34,7 @@ _DIGITS = 15
 class Mesh(Pictured):
     """Tetrahedra and named groups of faces; immutable.
 
-    Its arrays are checked and repaired as in ``checked_mesh``; ``dataclasses.replace`` makes
-    another mesh.
+    Arrays are checked as in ``checked_mesh``; ``dataclasses.replace`` makes another mesh.
 
     Parameters
     ----------
@@ -44,8 +43,7 @@ class Mesh(Pictured):
     tetrahedra : ndarray
         Point indices, shape (body_count, 4), all of positive volume.
     groups : mapping
-        Point indices (n, 3) by name: of outer faces with normals outward, or of inner faces that
-        two bodies share.
+        Point indices (n, 3) by name: of outer faces, normals outward, or of inner faces.
     notes : tuple of str, default ()
         Sentences about repairs and findings of the checks.
     source : str, default ""
@@ -60,8 +58,7 @@ class Mesh(Pictured):
     Attributes
     ----------
     bonded_shares : tuple of (str, float)
-        Inner groups and the share of the area of their faces that is bonded, 0 for none; a Scene
-        sets them.
+        Inner groups and the bonded share of the area of their faces; a Scene sets them.
     inner_groups : tuple of str
         Names of the groups of inner faces.
 
@@ -150,8 +147,7 @@ class Mesh(Pictured):
         Parameters
         ----------
         shares : mapping
-            Share by the name of an inner group, from 0 (no bond) to 1; a face in several groups has
-            the smallest.
+            Share by the name of an inner group, 0 (no bond) to 1; of several groups, the smallest.
         """
         if not instance("shares", shares, Mapping) and not self.bonded_shares:
             return self
@@ -218,8 +214,7 @@ class Mesh(Pictured):
         by : sequence of float, default (0.0, 0.0, 0.0)
             Shift [m].
         turned : sequence of float, default (0.0, 0.0, 0.0)
-            Rotation vector, right-handed, of the length of the angle [degrees]: (0, 0, 90) turns x
-            into y.
+            Rotation vector, right-handed, of the angle [degrees]: (0, 0, 90) turns x into y.
         about : sequence of float, optional
             Point on the axis [m]; the middle of the mesh's box by default.
         """
@@ -260,8 +255,7 @@ def checked_mesh(
     tetrahedra : array_like
         Point indices, shape (m, 4), in either orientation.
     groups : mapping
-        Point indices (k, 3) by name, in either orientation: of outer faces, or of inner ones that
-        two bodies share.
+        Point indices (k, 3) by name, in either orientation: of outer faces, or of inner ones.
     weld_tolerance : float, default 0.0
         Points not farther apart than this become one [m]; 0 welds nothing.
     keep_coincident : bool, default False

@@ -1,7 +1,6 @@
 """Unstructured tetrahedra: the points of a solid moved at random and joined by Delaunay's rule.
 
-Points keep to the corners, edges and planes that bound the solid. Other builds of SciPy's Qhull may
-round in another way, and join other points.
+Points keep to the bounds of the solid. Other builds of SciPy's Qhull may join other points.
 """
 
 from collections.abc import Callable

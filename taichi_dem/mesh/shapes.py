@@ -324,15 +324,13 @@ def join(*meshes: Mesh, names: Sequence[str] | None = None, bonded: bool = False
     names : sequence of str, optional
         Names of the meshes: first, second, ... by default.
     bonded : bool, default False
-        Whether bonds join the meshes where faces match, corner by corner. Without it they stay
-        apart, even where they touch.
+        Whether bonds join the meshes where faces match, corner by corner; else they stay apart.
 
     Returns
     -------
     Mesh
         Each mesh is a body group of its name. Its groups are named NAME_GROUP; groups of equal
-        names are also joined under that name. Outer faces that have become inner ones leave their
-        groups, unless all faces of a group have.
+        names are also joined under that name. Faces that have become inner ones leave their groups.
 
     Examples
     --------

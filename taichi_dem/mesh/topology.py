@@ -30,8 +30,7 @@ class Topology:
 
     The master is the body of lower index (Konno et al., section 2.1); bonds are sorted by (master,
     slave). vertices: points of the face, right-hand normal out of the master. body_bond: bond at
-    local face f of a body, -1 at an outer face. is_open: whether another body lies behind a free
-    face.
+    local face f of a body, -1 at an outer face. is_open: whether a body lies behind a free face.
     """
 
     master: np.ndarray
@@ -295,8 +294,7 @@ def _flip(links, colours, at, chain, first, second):
 class ContactSpheres:
     """Spheres of every face of every body in body frames [m]: centre (body_count, 4, n, 3), radius.
 
-    cluster: centre and radius of a ball around those of a face; extent: radius of the ball around
-    all of a body.
+    cluster: centre and radius of a ball around a face's spheres; extent: radius around a body's.
     """
 
     centre: np.ndarray

@@ -98,8 +98,7 @@ class Attenuation:
     speed : ndarray
         Largest speed of each body [m/s], shape (body_count,).
     inner : ndarray
-        Whether a body is nearer to the axis than to any side of the block, shape (body_count,);
-        elsewhere the wave comes back.
+        Whether a body is nearer to the axis than to any side of the block, shape (body_count,).
     """
 
     distance: np.ndarray

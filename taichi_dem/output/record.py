@@ -52,15 +52,13 @@ class Frame:
     level : ndarray
         Levels of the step, dt0 / 2^level, shape (body_count,).
     damage : ndarray
-        Share of the fracture energy that the bonds of a body have spent, from 0 to 1, shape
-        (body_count,).
+        Share of the fracture energy that a body's bonds have spent, 0 to 1, (body_count,).
     bound : ndarray
         Index in ``step_control.CRITERIA`` of what bounds the step, shape (body_count,).
     angular_momentum : ndarray
         About each body's own centre, in world axes [kg m^2/s], shape (body_count, 3).
     stress : ndarray
-        Mean stress of each body [Pa], shape (body_count, 3, 3): symmetric, in world axes, tension
-        positive.
+        Mean stress [Pa], shape (body_count, 3, 3): symmetric, in world axes, tension positive.
 
     Notes
     -----

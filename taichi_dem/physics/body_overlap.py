@@ -4,8 +4,7 @@ The depth of a point in a body is its distance from the nearest face. The integr
 over the shared volume, halved, is W: bodies whose flat sides lie in each other by d over an area A
 have W = A d^2 / 2. It is summed along rays from the incentre of a body to points of its faces: each
 stands for the pyramid to its share of the face, and the depth in the other body along it is linear
-from plane to plane. So W is a function of the depths of four corners below four planes, and
-forces are its exact derivatives.
+from plane to plane. So W depends on four corners below four planes; forces are exact derivatives.
 """
 
 from functools import reduce

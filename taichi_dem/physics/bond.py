@@ -16,8 +16,7 @@ class BondMotion:
 
     axes: rows are normal, xi, eta in world coordinates. branch: master centre to slave centre,
     world [m]. offset: the same in the face frame. turn: slave's body frame to the face frame.
-    velocity: of the slave's centre against the master's material there [m/s]. spin: slave's
-    minus master's [rad/s].
+    velocity: slave's centre against the master's material there [m/s]. spin: difference [rad/s].
     """
 
     axes: ti.types.matrix(3, 3, ti.f64)

@@ -20,8 +20,7 @@ def envelope_traction(strength, onset, failure, opening):
 def softening_energy(strength, onset, failure, limit):
     """Energy spent by softening up to an elastic limit.
 
-    The area under the law less the triangle that unloading to the origin gives back; the fracture
-    energy once the unit has failed.
+    The area under the law less what unloading gives back; the fracture energy after failure.
     """
     reached = ti.min(limit, failure)
     traction = envelope_traction(strength, onset, failure, reached)
@@ -51,8 +50,7 @@ def weakening_slip(stiffness, slope, cohesion, rubbing, reach):
     stiffness [Pa/m]; slope: loss of cohesion with slip, less than the stiffness [Pa/m]. cohesion:
     now, negative by slope times the slip since it was zero [Pa]. rubbing: friction times pressure
     [Pa]. reach: length of the elastic sliding, beyond the limit [m].
-    The limit is the largest of three lines over the slip (with cohesion, rubbing alone, zero) and
-    the traction falls faster than each of them, so the first root of the three is the slip.
+    The limit is the largest of three lines; the first root of the three is the slip.
     """
     weakening = (stiffness * reach - cohesion - rubbing) / (stiffness - slope)
     return ti.max(0.0, ti.min(weakening, reach - rubbing / stiffness, reach))

@@ -13,11 +13,9 @@ def braked_twist(mass, inertia, resistance, momentum, spin_momentum, dt):
 
     mass [kg], inertia (world, [kg m^2]). resistance: a ``Block`` of the dashpots. momentum,
     spin_momentum: of the body without them, the mean of before and after the step.
-    With p the latter, M the inertia of both and C the resistance, the body loses dt C u at the mean
-    twist u, which is thus u = (M + dt C / 2)^-1 p: the trapezoidal rule. It is stable for any C,
-    and leaves the limit of springs and other dashpots as it is: with w the frequency and d the rate
-    of those, the roots of z^2 - (1 + a - b (w dt)^2) z + a, a = (1 - d dt - c) / (1 + c), b = 1 /
-    (1 + c), c = dt C / (2 M), lie within the unit circle while (w dt)^2 + 2 d dt < 4, for any c.
+    With p the latter, M the inertia and C the resistance, the mean twist is (M + dt C / 2)^-1 p, by
+    the trapezoidal rule. It is stable for any C, and leaves other limits as they are: for springs
+    of frequency w and dashpots of rate d, (w dt)^2 + 2 d dt < 4, whatever C.
     """
     half = 0.5 * dt
     slowed = plus(

@@ -82,8 +82,7 @@ def world_tensor(rotation, tensor):
 def place_in(rotation, other, branch):
     """Rotation and place of a body in the frame of another: R^T R' and R^T d.
 
-    rotation: R, of the frame. other: R', of the body. branch: d, from the frame's origin to the
-    body's centre, world [m].
+    rotation: R, of the frame. other: R', of the body. branch: d, between their origins, world [m].
     """
     return transposed_matmul(rotation, other), transposed_matvec(rotation, branch)
 

@@ -16,8 +16,7 @@ DEEPEST_SHARE = 0.5
 def friction_force(coefficient, damping, force_normal, slide):
     """Friction [N] on the second sphere, against its sliding velocity slide [m/s].
 
-    Sliding friction coefficient * force_normal, but never more than damping * |slide|, which
-    keeps it from chattering where the sliding stops.
+    Sliding friction coefficient * force_normal, at most damping * |slide|, against chatter.
     """
     speed = norm(slide)
     force = 0.0 * slide
@@ -83,10 +82,8 @@ class Meeting:
     """Where two spheres meet: overlap [m], negative while they are apart.
 
     normal: from the first to the second, world. arm: from the first body's centre to the middle
-    of the overlap, world [m]. area: by which the numbers of a law are multiplied; 1 for spheres, of
-    contact [m2] for bodies. couple: moment of the contact about its point, per force along the
-    normal, world [m]; 0 for spheres. weight: by which the rate of a dashpot is multiplied, 1 for
-    spheres, as ``BodyGeometry.weight`` for bodies.
+    of the overlap, world [m]. area, weight: factors of a law's numbers and of its dashpot's rate,
+    1 for spheres. couple: moment about the contact's point per normal force, world [m].
     """
 
     overlap: ti.f64

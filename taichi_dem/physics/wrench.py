@@ -41,8 +41,7 @@ def point_block(arm, law):
 def mobility(mass_inverse_i, turn_i, mass_inverse_j, turn_j, branch):
     """Twist of j against i, at j's centre, per unit wrench that pushes them apart there.
 
-    mass_inverse [1/kg] as 3x3 matrices, turn: world inverse inertia [1/(kg m^2)], branch: from
-    i's centre to j's [m].
+    mass_inverse [1/kg] (3, 3), turn: world inverse inertia [1/(kg m^2)], branch: i to j [m].
     """
     across = cross_matrix(branch)
     lever = matmul(across, turn_i)

@@ -149,8 +149,7 @@ class Certificate(BaseCertificate):
     asleep : float
         Share of bodies times time that were asleep.
     impulse : float
-        Bound of the impulse that sleeping bonds of a connected part left out, as a share of its
-        momentum; largest over the parts.
+        Bound of the impulse that sleeping bonds of a part left out, as a share of its momentum.
     energy : float
         Bound of the energy that they left out, as a share of the energy of that part, likewise.
     missing : tuple of MissingEffect, default ()

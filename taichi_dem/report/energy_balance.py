@@ -2,8 +2,7 @@
 
 work of loads and supports + energy at the start = kinetic + bond strain + contact strain
 + bond dashpots + slip + softening + release + friction + contact dashpots + contact hysteresis
-+ ground dashpots
-- injected + residual. Terms of all contacts, also of whole bodies, are called ``sphere_*``.
++ ground dashpots - injected + residual. Terms of all contacts are called ``sphere_*``.
 """
 
 from collections.abc import Callable, Mapping

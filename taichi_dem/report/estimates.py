@@ -135,8 +135,7 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
     Returns
     -------
     tuple of Estimate
-        For each effect a dimensionless group that compares it with others, and the verdict
-        negligible, needed or unclear. Print them.
+        For each effect a dimensionless group, and negligible, needed or unclear. Print them.
 
     Raises
     ------

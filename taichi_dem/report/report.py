@@ -67,8 +67,7 @@ class Report:
     unresolved : tuple of str
         Sentences about bonds and contacts for which the step was too long.
     bound_by : dict
-        Number of bodies at the end by the criterion that bounds their step, see
-        ``step_control.CRITERIA``.
+        Number of bodies at the end by the ``step_control.CRITERIA`` that bounds their step.
     round_off_J : float, default 0.0
         Energies below this may be round-off [J].
     unconverged_steps : int, default 0

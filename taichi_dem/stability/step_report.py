@@ -45,8 +45,7 @@ class StepReport:
     ----------
     limits : dict
         Largest steps [s] by criterion, shape (body_count,) each: bond_stiffness, bond_dashpot,
-        contact_stiffness and contact_dashpot (all of the worst face in one contact). A criterion
-        whose effect a scene leaves out is missing.
+        contact_stiffness and contact_dashpot (all of the worst face in one contact).
     altitude_m : ndarray
         Smallest altitude of each body [m], (body_count,).
     aspect_ratio : ndarray
@@ -79,8 +78,7 @@ class StepReport:
         Parameters
         ----------
         dashpots : str
-            How the method takes dashpots, a key of ``METHODS``: ``"full"``, ``"limited"`` or
-            ``"solved"``, which leaves the limit of the springs.
+            How the method takes dashpots: ``"full"``, ``"limited"`` or ``"solved"``.
         link : str, default "bond"
             ``"bond"``, or ``"contact"`` for all of the worst face in one contact.
         """
@@ -160,8 +158,7 @@ def step_report(scene: Scene) -> StepReport:
     Notes
     -----
     Limits hold for a pair of equal bodies that move against each other: no mesh has a smaller
-    limit, and none more than twice the limit. Of contacts with bodies of several materials the
-    stiffest counts.
+    limit, and none more than twice. Of contacts with several materials the stiffest counts.
     """
     mesh, material = instance("scene", scene, Scene).mesh, scene.body_materials
     effects = map(scene.effect, ("dashpot", "friction", "contact"))

@@ -55,8 +55,7 @@ class PairStore:
     body: the two bodies of a slot, first < second; first .. last: places of its sphere pairs;
     impulse[2 p + side]: pending impulse [N s] and moment about the body's centre [N m s], valid
     where waiting is 1; heat: of dashpots, friction, injected and of the law [J], until the first
-    body takes it. Columns of others are zero when their pair comes near, or their sphere pair is
-    found.
+    body takes it. Other columns are zero when their pair comes near, or their sphere pair is found.
 
     Pairs are visited by (first body, second body), whatever the order of slots, so that sums do not
     depend on the history of searches: first_of[i], second_start[i]: where those of body i begin.

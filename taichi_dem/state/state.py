@@ -67,8 +67,7 @@ class Activity:
 class BodyMotion:
     """A body at the beginning of its step, in world axes; velocity and spin of half a step before.
 
-    since, until: times [s] over which a varying load acts by its mean; those of a body's steps
-    follow each other without a gap.
+    since, until: times [s] over which a varying load acts by its mean, without gaps.
     """
 
     position: vec3
@@ -97,8 +96,7 @@ def unserved_limits(model: Model) -> np.ndarray:
 class State:
     """Motion of the bodies, pending impulses, fracture and the energy account, in SI units.
 
-    A body's motion is that of its own last tick. orientation: unit quaternion, scalar first;
-    angular_momentum in world axes; spin follows from them and is stored for the neighbours.
+    A body's motion is that of its own last tick. angular_momentum in world axes; spin follows.
     lag: time [s] by which what a body has taken of each load is behind its position. slot: impulse
     and moment about the centre that face f of body i has gathered since, entry 4 i + f.
     bond_drag, bond_heat: energy taken from each bond by dashpots, by slip and release [J].

@@ -1,10 +1,8 @@
 """What a body takes in a step, from its neighbours and from outside, and how it moves.
 
-Times from and up to which each load acts on a body leave no gap, so that no pulse is lost: each
-begins where the last one of its body ended. A load that changes acts up to the middle of the step,
-where the leapfrog has the new velocity: of second order without dashpots. One that does not acts
-for the step itself, as springs do: it balances them also where steps change, and may be behind or
-ahead until it changes. The ground is solved in the body's own update.
+Times over which each load acts on a body leave no gap, so no pulse is lost. A load that changes
+acts up to the middle of the step, where the leapfrog has the new velocity: of second order without
+dashpots. One that does not acts for the step itself, as springs do, and balances them.
 """
 
 import taichi as ti

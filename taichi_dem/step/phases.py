@@ -89,8 +89,7 @@ class Step:
 
     search: the ``BroadPhase`` that renews contact lists between substeps, None without contact.
     solver: what its sweeps solve, None for a step without any; solves: whether there is one.
-    staggered: whether velocities are half a step behind positions, as the leapfrog's are. An order
-    of one's own that keeps both at one time sets it to False.
+    staggered: whether velocities are half a step behind positions, as the leapfrog's are.
     """
 
     solver: Any = None

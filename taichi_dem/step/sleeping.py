@@ -2,9 +2,8 @@
 
 A body wakes its neighbours once what a sleeping bond leaves out is more than a share of what counts
 there: of the opening at which a law of that bond begins, or of the mean speed of the connected part
-that the body belongs to. Other parts do not count, however large or fast. A bond acts from the time
-at which both of its bodies are awake, with its whole opening: momentum is exact, as the impulses
-that it left out before are equal and opposite. They are bounded and booked when the bond wakes.
+that the body belongs to. A bond acts, with its whole opening, once both of its bodies are awake:
+the impulses that it left out are equal and opposite, and bounded and booked when it wakes.
 """
 
 import numpy as np

@@ -1,9 +1,8 @@
 """A step of one length for all bodies, in which the dashpots of bonds and contacts are solved.
 
-Velocities at the end of the step are predicted with the impulses of springs and loads at its
-beginning and of the dashpots as in the step before; sweeps over all dashpots correct them. Springs
-and loads act at the time of the positions, dashpots with the mean of the velocities before and
-after: the scheme is of second order, and the velocities are those in the middle of the next step.
+Velocities are predicted with the impulses of springs and loads at the beginning and of the dashpots
+as in the step before; sweeps over all dashpots correct them. Dashpots act with the mean of the
+velocities before and after: of second order, and velocities are of the middle of the next step.
 """
 
 import taichi as ti

@@ -25,11 +25,9 @@ class Accumulator:
     """Distance travelled after a turn: one of four readings of a rule that the paper leaves open.
 
     The paper says that the distance is summed up to a cell's width (eq. 8), but not how a turn
-    changes the sum. ``signed`` takes the sum for a position: the distance along the new direction
-    is the component of the old one, so that a turn straight back changes its sign, and a wall sets
-    it to the wall's position, which is zero while the container does not move.
-    ``signed_through_walls`` leaves walls out, ``reset`` starts from zero at every turn, and
-    ``kept`` keeps the sum.
+    changes the sum. ``signed`` takes the sum for a position: a turn straight back changes its sign,
+    and a wall sets it to the wall's position.
+    ``signed_through_walls`` skips walls, ``reset`` starts anew at every turn, ``kept`` keeps it.
     """
 
     def __init__(self, reading: str, lattice: Lattice):

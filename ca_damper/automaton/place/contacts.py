@@ -3,9 +3,7 @@
 Places across a column are not kept: a grain is anywhere in its column with equal probability.
 Two discs of diameter d in neighbouring columns are then b apart across with the density b / d^2,
 for b up to d, and touch once their heights differ by z d with z^2 + (b / d)^2 = 1. Those that have
-not touched so far are a share (1 + z^2) / 2 of all pairs, which gives the rate below. Two discs
-that pass each other meet with the probability 1/2: with its own column and those on both sides a
-disc sweeps two diameters, as discs do.
+not touched so far are a share (1 + z^2) / 2 of all pairs, which gives the rate below.
 """
 
 import taichi as ti
@@ -91,8 +89,7 @@ def most_drag(slip, share):
 class GrainContacts(OnCells):
     """Find the events of a step and the grains that each of them needs.
 
-    shared: hash of seed and step, read where an event is noted: it keeps the compiler from
-    computing ranks of all cells ahead.
+    shared: hash of seed and step, read late, so that not all ranks are computed ahead.
     """
 
     def __init__(self, resting: Heap):

@@ -98,8 +98,7 @@ class Place(Rules):
     wall_friction : float, default 0.5
         Friction coefficient between particle and wall.
     static_contact : bool, default True
-        Whether particles come to rest on the floor and on the heap there, move with the container
-        and weigh on it.
+        Whether particles come to rest on floor and heap, move with the container and weigh on it.
     """
 
     friction: float = 0.5

@@ -57,8 +57,7 @@ class ErrorParts:
     solver : float or ndarray, default 0.0
         Error of sweeps that end early, in the unit of the value.
     chance : float or ndarray, default 0.0
-        Spread of runs that differ by chance, by the ends of their steps or by seeds, in the unit of
-        the value.
+        Spread of runs that differ by chance (ends of steps, seeds), in the unit of the value.
     sampling : float or ndarray, default 0.0
         Error of the time over which a mean was taken, in the unit of the value.
     contact : float, default 0.0
@@ -131,8 +130,7 @@ class Plan:
     begin : int, default 0
         Where a similar question of ``taichi_dem.solve`` may start: a level of the step.
     parting_s : float, default math.inf
-        Simulated time from which runs that differ by one rounding differ by more than was allowed
-        [s]; infinite if never.
+        Time from which one rounding makes a difference above the tolerance [s]; infinite if never.
     """
 
     method: str
@@ -194,8 +192,7 @@ class Answer:
     unit : str
         Unit of the value, ``"1"`` for none.
     value : float or ndarray
-        A number, or one for each place of a curve, in the unit of the goal; that of the most
-        frequent branch where there are several.
+        A number, or one for each place of a curve; that of the most frequent branch.
     parts : ErrorParts
         Half-widths of the error bar by source.
     tolerance : float
@@ -209,8 +206,7 @@ class Answer:
     cost_curve : sequence of Expense, optional
         What other tolerances would cost.
     shortfall : str, default ""
-        Why the answer falls short, and what would help: the error is too large, or the run itself
-        is in doubt. ``""`` if neither.
+        Why the answer falls short, and what would help; ``""`` if it does not.
     branches : tuple of Branch, default ()
         Outcomes of the runs of a question without a single answer, the most frequent first.
     sources : tuple of Source, default ()

@@ -28,8 +28,7 @@ class Source:
     seconds : float, default nan
         CPU time that its measurement took or would take [s]; nan if unknown.
     common : float, default 0.0
-        Of a source that was not measured, the half-width that half of such questions exceed, in the
-        unit of the value; 0 if unknown.
+        If not measured, the half-width that half of such questions exceed; 0 if unknown.
     """
 
     name: str

@@ -143,8 +143,7 @@ def _checked_values(values, row):
 class Journal:
     """Records of finished jobs in a folder, a small file each: whole or not there.
 
-    folder: path; None for a journal that forgets. Raises InputError for a folder that cannot be
-    written to.
+    folder: path; None for a journal that forgets. InputError for a folder that refuses files.
     """
 
     def __init__(self, folder: FileName | None):

@@ -70,19 +70,16 @@ def sweep(
     workers : int, optional
         Number of processes on this machine, from 1 to 1024; by default one a core.
     client : distributed.Client or str, optional
-        A ``dask.distributed.Client``, or the address of a Dask scheduler, whose workers run the
-        rows instead; each has one thread.
+        A client, or the address, of a Dask scheduler whose workers run the rows instead.
     out : path, optional
         Folder that keeps each finished row. The same call later runs only rows that are missing,
-        or for which the row, the text of the function's file, the version of the package or
-        ``version`` has changed.
+        or whose values, function's file, package version or ``version`` have changed.
     seed : int
         Seed from which those of the rows follow, a whole number from 0 to 2^63.
     version : str
         Version of whatever else the results depend on, such as files that the function reads.
     progress : "auto", function or None
-        "auto" for a bar on a terminal and in Jupyter, elsewhere lines, None, or a function of a
-        ``Progress``.
+        "auto" for a bar or lines, None, or a function of a ``Progress``.
 
     Returns
     -------

@@ -30,8 +30,7 @@ _CELL_HEIGHT = 680
 class WebPage(os.PathLike):
     """A page that was written.
 
-    As the last line of a notebook's cell it shows itself; ``open``, ``Path`` and ``str`` take it
-    as the path of its file.
+    As the last line of a notebook's cell it shows itself; ``open``, ``Path`` and ``str`` take it.
     """
 
     def __init__(self, path: str, text: str):

@@ -26,8 +26,7 @@ class BondDashpots:
 
     A bond answers the twist in a step (slave against master, at the slave's centre) with the
     wrench impulse y = C (theta s1 + (1 - theta) s0), s0 and s1 at both ends of the step. The sum
-    s1 + s0 (1 - theta) / theta carries over from step to step: it is the warm start, and y itself
-    need not be stored.
+    s1 + s0 (1 - theta) / theta carries over to the next step: the warm start; y is not stored.
 
     theta: where in the step dashpots take their velocity, and (1 - theta) / theta. refresh_every:
     steps between two renewals of the blocks. colour_first: first group of each colour. index: place
@@ -35,9 +34,8 @@ class BondDashpots:
     slave's [m].
     a, b, c: the block (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair. start: s0. last:
     the s1 that the present y satisfies. Velocities in m/s, spins in rad/s, world.
-    Bonds are visited by fours, one a lane (``kit.lanes``): place k is lane k % LANES of group k //
-    LANES, and fields are those of groups. Groups are of one colour; lanes that are left over, and
-    those of released bonds, belong to the spare body, and their twist and impulse stay zero.
+    Bonds are visited by fours of one colour, one a lane (``kit.lanes``): place k is lane k % LANES
+    of group k // LANES. Lanes without a bond that holds belong to the spare body.
     """
 
     constant_fields = ("theta", "refresh_every", "index", "colour_first")

@@ -38,8 +38,7 @@ def _lowest_free(taken):
 class PairDashpots(ContactForces):
     """Contacts whose dashpots are solved. Data of touching spheres used in sweeps.
 
-    One block for all spheres of a pair would let parting spheres pull on each other while others
-    push: a rocking pair would stick. So each sphere has its own impulse.
+    Each sphere has its own impulse: with one block for all, a rocking pair would stick.
 
     touching: number of spheres of a pair that touch, or may within the step; they come first among
     the pair's candidates. entry: index of the candidate. normal: from first to second. arm: from

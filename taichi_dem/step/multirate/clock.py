@@ -23,12 +23,10 @@ class Clock:
 
     uniform: all bodies share the finest level wanted. finest: finest level present. low: coarsest
     level active now. limits: the ``StabilityLimits`` of the bodies, None where the rule needs none.
-    controlled: whether they choose the steps, and bodies may be brought to the present between
-    their own times. every_bond_acts: whether each that holds does in every substep: its impulse
-    then replaces the last one, which its bodies have taken, instead of being added to it.
-    evaluations: substeps, bodies advanced, bonds and pairs evaluated, and the bonds and pairs that
-    one step for all would have evaluated in the same substeps, and the bonds whose laws were
-    called.
+    controlled: whether they choose steps. every_bond_acts: whether each that holds does in every
+    substep: its impulse then replaces the last one instead of being added to it.
+    evaluations: substeps, bodies advanced, bonds and pairs evaluated, those that one step for all
+    would have evaluated in the same substeps, and bonds whose laws were called.
     """
 
     def __init__(self, tables: Tables, state: State, contacts: Contacts | None, method: Method):

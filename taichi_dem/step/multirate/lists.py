@@ -79,10 +79,8 @@ class Coloured(Places):
 class ActiveList(Places):
     """Indices in order of falling key; end[k] counts the members with a key of at least k.
 
-    everyone: all members. key_of: function that gives a member's key, negative for one that is not
-    to be listed. order: the members; index: where in it each one is; key: each one's key, -1 for
-    one that is not listed. listing: lists all members by their keys. The order within a key does
-    not matter: nothing that is computed depends on it.
+    everyone: all members. key_of: gives a member's key, negative for one that is not listed. order:
+    the members; index: where in it each one is; key: each one's key. listing: lists all members.
     """
 
     def __init__(self, everyone: Everyone, key_of: Callable[..., Any]):

@@ -22,9 +22,8 @@ class Schedule(Clock):
     """Levels of the bodies, and the lists of what is due.
 
     criterion: the method's rule from ``step_control``. undivided: 1 once the finest level of all
-    was reached, below which no step is divided further. applied_until: the time up to which bonds
-    and pairs have applied their impulses, where bodies may be woken. level_limit: largest
-    difference of levels between neighbours.
+    was reached. applied_until: time up to which bonds and pairs have applied their impulses, where
+    bodies may be woken. level_limit: largest difference of levels between neighbours.
     """
 
     def __init__(self, tables: Tables, state: State, contacts: Contacts | None, method: Method):
