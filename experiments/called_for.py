@@ -111,7 +111,7 @@ def draw_frames(path, results, table):
             broken = ~np.isnan(result.broken_time)
             drawn = draw_bodies(axes, model, frame, moved, broken=broken, **look)
             axes.set(title=row.scene, **AROUND)
-            off = f", {row.error_percent:.0f} % off" * (row.error_percent > 0.0)
+            off = f", hole {row.error_percent:.0f} % off" * (row.error_percent > 0.0)
             axes.set_xlabel(f"{row.seconds:.1f} s{off}")
         bar = {"location": "bottom", "aspect": 30, "extend": "max"}
         figure.colorbar(drawn, ax=panels, label="displacement [mm]", **bar)
