@@ -101,8 +101,8 @@ class StepReport:
             criteria.append([name, f"{(binding == name).sum()}", *figures])
         lines = [line for table in (methods, criteria) for line in [*aligned(table), ""]]
         explained = (
-            "in contact: all contacts of the worst face at once; Multirate: of the worst body, as "
-            "each has its own; StepControl takes its safety's share of them"
+            "in contact: if all contacts of the worst face act at once; Multirate takes this step "
+            "for the worst body alone, StepControl its safety's share"
         )
         return "\n".join([*lines, *self._worst(), explained, *warnings])
 
@@ -119,8 +119,8 @@ class StepReport:
             rows.append([f"{body}", f"{step[body]:.3g}", binding[body], *shape, f"{price:.3g}"])
         taken = 100.0 * float((1.0 / step[order[:WORST]]).sum() / (1.0 / step).sum())
         words = (
-            "price: factor on the step of all without this body and those above; "
-            f"with steps of their own they take {taken:.3g} % of the updates"
+            "price: how many times longer the common step could be without this body and those "
+            f"above; if each has its own step, they take {taken:.3g} % of the updates"
         )
         return [*aligned(rows), "", words]
 

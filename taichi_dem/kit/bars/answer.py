@@ -147,7 +147,7 @@ class Plan:
 
     def __str__(self):
         words = f"{self.method}; {self.seconds:.2g} s, of which pilot {self.pilot_s:.2g} s"
-        parting = f"runs that differ by one rounding separate from {self.parting_s:.2g} s on"
+        parting = f"runs that differ by one rounding part after {self.parting_s:.2g} s"
         return words if math.isinf(self.parting_s) else f"{words}; {parting}"
 
 

@@ -139,7 +139,7 @@ class Search:
         if more is None:
             total = _percent(worst.parts.total, worst)
             self.known.why = (
-                f"the mean of {counted(self.known.seeds, self.known.runs.run)} has {total}"
+                f"the mean of {counted(self.known.seeds, self.known.runs.run)} is known to {total}"
             )
         elif self.known.affords(self.known.seeds * len(self.known.levels), self.known.levels[0]):
             self.known.seeds = more
@@ -151,7 +151,7 @@ class Search:
             self.known.why = "the number of broken faces is known to one at best"
             return
         if last - self.known.levels[0] >= _MOST_FINE:
-            self.known.why = f"halving the step of {runs.step(last):.2g} s changes as much"
+            self.known.why = f"halving the step of {runs.step(last):.2g} s still changes as much"
             return
         if not self.known.eventful:
             wanted = _halvings(largest(worst.parts.total), worst.allowed, runs.order)
