@@ -6,7 +6,7 @@
 
 Results go to results/NAME, or with --quick to results/quick/NAME; `make docs` shows all experiments
 on the page Gallery. The exit code is 1, with a list, if an experiment failed. A new experiment gets
-an entry in _gallery_pages.txt; --readme then updates the table of docs/experiments.md. --pictures
+an entry in _gallery_pages.txt; --readme then updates the list of docs/experiments.md. --pictures
 copies small pictures and figures of full runs into docs, and CPU times of runs with --cold, full
 and quick ones, into _gallery_pages.txt; --readme writes these into the pages.
 """
@@ -48,7 +48,7 @@ _TABLE = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
     "quick": "run smaller jobs",
     "cold": "compile all kernels in each: its CPU time is that of a first run",
-    "readme": "update the table of experiments and the figures in all pages, run nothing",
+    "readme": "update the list of experiments and the figures in all pages, run nothing",
     "pictures": f"update {SMALL_PICTURES} and the figures for the pages, run nothing",
 }
 
@@ -193,18 +193,16 @@ def number_of(formula, digits, names):
     return f"{rounded:,.0f}" if rounded >= 10 ** (digits - 1) else f"{rounded:.{digits}g}"
 
 
-def table_of_experiments():
-    """All experiments as a table for a page of the docs: names, which lead to pictures."""
-    lines = ["| name | question |", "|---|---|"]
-    lines += [f"| [{one.name}](pictures/{one.name}.png) | {one.question} |" for one in PAGES]
-    return "\n".join(lines) + "\n"
+def list_of_experiments():
+    """All experiments as a list for a page of the docs: names, which lead to pictures."""
+    return "".join(f"- [{one.name}](pictures/{one.name}.png): {one.question}\n" for one in PAGES)
 
 
 def renew_readme(root):
-    """Renew the table of experiments, and in the sentences of all pages the figures."""
-    path, table = Path(root, "docs/experiments.md"), table_of_experiments()
+    """Renew the list of experiments, and in the sentences of all pages the figures."""
+    path, listed = Path(root, "docs/experiments.md"), list_of_experiments()
     text = path.read_text(encoding="utf-8")
-    text = re.sub(r"\| name \|.*?\n\n", lambda _: f"{table}\n", text, flags=re.DOTALL)
+    text = re.sub(r"(- \[\w+\]\(pictures/.*\n)+", lambda _: listed, text)
     write_text(path, text)
     for path in (Path(root, "README.md"), *sorted(Path(root, "docs").glob("*.md"))):
         filled = fill_figures(path.relative_to(root).as_posix(), root)

@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 from docs.site.conf import CONTENTS
-from gallery import fill_figures, sentences_of, table_of_experiments
+from gallery import fill_figures, list_of_experiments, sentences_of
 from tests.docs.pages import FOLDER, PAGES, anchors, headings, links, text_of, tokens, words
 
 PACKAGES = ("taichi_dem.", "ca_damper.")
@@ -146,9 +146,9 @@ def test_figures_are_those_kept_of_full_runs(page):
     assert not re.findall(typed, text)
 
 
-def test_the_table_of_experiments_is_that_of_the_gallery():
-    table = table_of_experiments()
-    assert table in text_of("docs/experiments.md"), "renew it: experiments/gallery.py --readme"
+def test_the_list_of_experiments_is_that_of_the_gallery():
+    listed = list_of_experiments()
+    assert listed in text_of("docs/experiments.md"), "renew it: experiments/gallery.py --readme"
 
 
 def test_the_site_lists_every_page_once():
