@@ -327,11 +327,6 @@ class ContactSpheres:
     cluster: np.ndarray
     extent: np.ndarray
 
-    @property
-    def per_face(self) -> int:
-        """Number of spheres on a face."""
-        return self.radius.shape[2]
-
 
 def interior_crossings(divisions: int) -> np.ndarray:
     """Barycentric coordinates (k, 3) of the interior crossings for edges cut in n equal parts."""
