@@ -102,7 +102,7 @@ class BlastEngine(Engine):
         lengths = {room.bodies: n, room.faces: 4 * n}
         lengths.update({room.bonds: model.bond_count, room.units: 3 * model.bond_count})
         if model.has_contact:
-            lengths[room.spheres] = 4 * n * model.spheres.per_face
+            lengths[room.spheres] = 4 * n * model.geometry.face_spheres
         return lengths
 
     def accepts(self, model: Model) -> bool:

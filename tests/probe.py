@@ -122,7 +122,7 @@ class ContactProbe(Probe):
     def __init__(self, mesh, effects, material=CONCRETE):
         super().__init__(mesh, effects, material)
         self.store = self.simulation.contacts.store
-        self.sphere = self.simulation.values(self.tables.sphere)
+        self.sphere = self.simulation.values(self.tables.geometry.sphere)
 
     def evaluate(self, spheres, position, orientation=None, velocity=None, spin=None):
         """Force [N] and torque [N m] on both bodies (2, 6), and the three heats per STEP [W].

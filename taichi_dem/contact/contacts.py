@@ -53,7 +53,7 @@ class Contacts:
         """Upload the numbers of a scene and a method; no pairs exist yet."""
         effect = model.geometry
         assign(self.outer_waits, int(effect.outer_faces == ONCE_BROKEN))
-        assign(self.skin, effect.skin * model.spheres.extent)
+        assign(self.skin, effect.skin * effect.extents(model))
         assign(self.pace, np.array([method.dt0, method.steps_ahead]))
 
     @ti.func

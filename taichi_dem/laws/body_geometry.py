@@ -1,7 +1,5 @@
 """Geometry of contact: whole bodies, by the energy of their shared volume."""
 
-from dataclasses import replace
-
 import numpy as np
 import taichi as ti
 
@@ -20,7 +18,6 @@ from taichi_dem.kit.validation import whole
 from taichi_dem.laws.contact_contracts import Geometry
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, all_faces, area_vectors
-from taichi_dem.mesh.topology import ContactSpheres, spheres_of_faces
 from taichi_dem.physics.body_overlap import raised, ray_ends, sum_of_rays, turning
 from taichi_dem.physics.rotation import place_in
 from taichi_dem.physics.sphere_pair import Meeting, Nearest
@@ -72,11 +69,9 @@ class BodyGeometry(Geometry):
         self.parts = whole("parts", parts, 2, MOST_PARTS)
         super().__init__(outer_faces, skin)
 
-    def spheres(self, model: Model) -> ContactSpheres:
-        """A body extends to its corners; nothing reads the spheres."""
-        return replace(
-            spheres_of_faces(model.mesh, model.centre, self.divisions), extent=model.body_radius
-        )
+    def extents(self, model: Model) -> np.ndarray:
+        """A body extends to its corners."""
+        return model.body_radius
 
     def declare(self, capacity: Capacity) -> None:
         """Corners, planes (4 x 3 normals, 4 distances) and ray ends of bodies, in their frames."""

@@ -17,7 +17,6 @@ from taichi_dem.laws.base import Effect, Reported
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.mesh import Mesh, volumes
-from taichi_dem.mesh.topology import ContactSpheres
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
 
@@ -94,8 +93,8 @@ class Geometry(Effect):
         self.store = store
 
     @abstractmethod
-    def spheres(self, model: Model) -> ContactSpheres:
-        """Balls that hold all that can touch of a face, or of a body."""
+    def extents(self, model: Model) -> np.ndarray:
+        """Radius [m] about the centre of each body within which all lies that can touch, (n,)."""
         raise NotImplementedError
 
     @abstractmethod

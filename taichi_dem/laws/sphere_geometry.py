@@ -1,13 +1,16 @@
 """Geometry of contact: spheres on broken faces (Konno et al., 2.2, Fig. 5)."""
 
+import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.products import matvec, norm, squared
+from taichi_dem.kit.types import real
 from taichi_dem.kit.validation import whole
 from taichi_dem.laws.contact_contracts import Geometry
-from taichi_dem.mesh.topology import ContactSpheres, spheres_of_faces
 from taichi_dem.physics.sphere_pair import Nearest, is_within, meeting
 from taichi_dem.state.model import Model
+from taichi_dem.state.tables import Capacity
 
 
 @ti.data_oriented
@@ -26,6 +29,8 @@ class SphereGeometry(Geometry):
         body; more where bodies are fast. It changes time, not results.
     """
 
+    constant_fields = "sphere", "cluster"
+
     def __init__(
         self,
         divisions: int = 5,
@@ -35,14 +40,26 @@ class SphereGeometry(Geometry):
         self.divisions = whole("divisions", divisions, 3, 20)
         super().__init__(outer_faces, skin)
 
-    def spheres(self, model: Model) -> ContactSpheres:
-        """Spheres of a model, in balls that hold all of a face."""
-        return spheres_of_faces(model.mesh, model.centre, self.divisions)
+    def extents(self, model: Model) -> np.ndarray:
+        """A body extends to its spheres."""
+        return model.spheres.extent
+
+    def declare(self, capacity: Capacity) -> None:
+        """Spheres of all faces, and a ball around those of each: centre and radius [m]."""
+        self.sphere = ti.Vector.field(4, real, shape=capacity.spheres)
+        self.cluster = ti.Vector.field(4, real, shape=capacity.faces)
+
+    def load(self, model: Model) -> None:
+        """Load the spheres of a scene."""
+        spheres = model.spheres
+        ball = np.concatenate([spheres.centre, spheres.radius[..., None]], axis=-1)
+        assign(self.sphere, ball.reshape(-1, 4))
+        assign(self.cluster, spheres.cluster.reshape(-1, 4))
 
     @ti.func
     def nearest(self, a, b, turn, offset):
         """Where two bodies are nearest by an entry (a, b) of the pair store, a ``Nearest``."""
-        first, second = self.tables.sphere[a], self.tables.sphere[b]
+        first, second = self.sphere[a], self.sphere[b]
         apart = matvec(turn, second.xyz) + offset - first.xyz
         size = first[3] + second[3]
         return Nearest(first=first, apart=apart, reach=size, size=size)
@@ -63,12 +80,12 @@ class SphereGeometry(Geometry):
         for fg in range(16):
             if (faces >> fg) & 1 == 1:
                 first, second = 4 * i + fg // 4, 4 * j + fg % 4
-                mine, other = self.tables.cluster[first], self.tables.cluster[second]
+                mine, other = self.cluster[first], self.cluster[second]
                 middle, reach = matvec(turn, other.xyz) + offset, other[3] + gap
                 if squared(middle - mine.xyz) < (mine[3] + reach) ** 2:
                     size = self.tables.face_spheres[None]
                     for a in range(size * first, size * first + size):
-                        sphere = self.tables.sphere[a]
+                        sphere = self.sphere[a]
                         # One far from the ball around those of the other face is far from all.
                         if squared(middle - sphere.xyz) < (sphere[3] + reach) ** 2:
                             count, gap = self._compare_one(
@@ -79,9 +96,9 @@ class SphereGeometry(Geometry):
     @ti.func
     def _compare_one(self, a, first, turn, offset, margin, gap, place, count):
         """The same of sphere a with those of a face, from the first on."""
-        sphere = self.tables.sphere[a]
+        sphere = self.sphere[a]
         for b in range(first, first + self.tables.face_spheres[None]):
-            other = self.tables.sphere[b]
+            other = self.sphere[b]
             reach = sphere[3] + other[3]
             apart = squared(matvec(turn, other.xyz) + offset - sphere.xyz)
             if apart < (reach + margin) ** 2:
@@ -110,6 +127,6 @@ class SphereGeometry(Geometry):
     @ti.func
     def gap(self, a, b, first, turned_first, second, turned_second):
         """Gap of two spheres [m]."""
-        one, other = self.tables.sphere[a], self.tables.sphere[b]
+        one, other = self.sphere[a], self.sphere[b]
         on_first, on_second = matvec(turned_first, one.xyz), matvec(turned_second, other.xyz)
         return norm(second + on_second - first - on_first) - one[3] - other[3]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -245,49 +246,71 @@ def edge_colours(links: np.ndarray, body_count: int) -> np.ndarray:
     """Colour of every link, (n,) from 0 on; links that share a body differ."""
     # Greedy; before a new colour is taken, a chain of two colours is flipped if that frees one.
     # Four bonds a body need at most five colours.
-    colours = np.full(len(links), -1, dtype=np.int32)
-    at: list[dict[int, int]] = [{} for _ in range(body_count)]
-    highest = -1
-    for link, (i, j) in enumerate(np.asarray(links).tolist()):
-        most = max(max(at[i], default=-1), max(at[j], default=-1)) + 1
-        used = max(most, 1 + highest)
-        free = [k for k in range(used) if k not in at[i] and k not in at[j]]
-        colour = free[0] if free else _freed(links, colours, at, i, j, used)
-        colours[link] = colour
-        at[i][colour] = at[j][colour] = link
-        # A flipped chain may have held the only link of the last colour.
-        highest = max(highest, colour) if free else int(colours.max())
-    return colours
+    given = _Colouring(links, body_count)
+    first, second, taken = *given.ends, given.taken
+    for link, i, j in zip(range(len(first)), first, second):
+        both = taken[i] | taken[j]
+        colour = (~both & (both + 1)).bit_length() - 1
+        given.put(link, colour if colour < len(given.counts) else given.freed(i, j))
+    return np.array(given.colours, dtype=np.int32)
 
 
-def _freed(links, colours, at, i, j, used):
-    """A colour made free at both bodies by flipping a chain from the second; else a new one."""
-    for mine in (k for k in range(used) if k not in at[i]):
-        for other in (k for k in range(used) if k not in at[j]):
-            chain, end = _chain(links, at, j, mine, other)
-            if end != i:
-                _flip(links, colours, at, chain, mine, other)
-                return mine
-    return used
+class _Colouring:
+    """Links that have a colour so far.
 
+    taken: bits of the colours at each body; at: the link of each colour at each body, in rows of
+    ``width``; counts: links of each colour.
+    """
 
-def _chain(links, at, body, first, second):
-    """Links of two alternating colours from a body on, and the body where they end."""
-    chain, colour = [], first
-    while colour in at[body]:
-        link = at[body][colour]
-        chain.append(link)
-        body = int(links[link][0] + links[link][1] - body)
-        colour = first + second - colour
-    return chain, body
+    def __init__(self, links, body_count):
+        self.ends = [array("i", column.astype(np.int32).tobytes()) for column in links.T]
+        self.width = 2 * int(np.bincount(links.ravel(), minlength=1).max())
+        self.taken, self.counts = [0] * body_count, []
+        self.colours = array("i", bytes(4 * len(links)))
+        self.at = array("i", bytes(4 * self.width * body_count))
 
+    def put(self, link, colour):
+        """Give a link a colour that is free at both of its bodies."""
+        if colour == len(self.counts):
+            self.counts.append(0)
+        self.counts[colour] += 1
+        self.colours[link] = colour
+        for ends in self.ends:
+            body = ends[link]
+            self.taken[body] |= 1 << colour
+            self.at[self.width * body + colour] = link
 
-def _flip(links, colours, at, chain, first, second):
-    swapped = {first: second, second: first}
-    for link in chain:
-        colours[link] = swapped[int(colours[link])]
-    for body in {body for link in chain for body in links[link]}:
-        at[body] = {swapped.get(colour, colour): link for colour, link in at[body].items()}
+    def freed(self, i, j):
+        """A colour made free at both bodies by flipping a chain from the second; else a new one."""
+        colours = range(len(self.counts))
+        for mine in (k for k in colours if not self.taken[i] >> k & 1):
+            for other in (k for k in colours if not self.taken[j] >> k & 1):
+                chain, end = self._chain(j, mine, other)
+                if end != i:
+                    self._flip(chain, (j, end), mine, other)
+                    return mine
+        return len(colours)
+
+    def _chain(self, body, first, second):
+        """Links of two alternating colours from a body on, and the body where they end."""
+        chain, colour = [], first
+        while self.taken[body] >> colour & 1:
+            link = self.at[self.width * body + colour]
+            chain.append(link)
+            body = self.ends[0][link] + self.ends[1][link] - body
+            colour = first + second - colour
+        return chain, body
+
+    def _flip(self, chain, ends, first, second):
+        """Exchange the colours of a chain of links between two bodies."""
+        for body in ends:
+            self.taken[body] ^= 1 << first | 1 << second
+        for link in chain:
+            colour = self.colours[link]
+            self.counts[colour] -= 1
+            self.put(link, first + second - colour)
+        while not self.counts[-1]:
+            self.counts.pop()
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,11 +324,6 @@ class ContactSpheres:
     radius: np.ndarray
     cluster: np.ndarray
     extent: np.ndarray
-
-    @property
-    def per_face(self) -> int:
-        """Number of spheres on a face."""
-        return self.radius.shape[2]
 
 
 def interior_crossings(divisions: int) -> np.ndarray:

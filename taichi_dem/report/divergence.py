@@ -75,7 +75,7 @@ class DivergenceCheck:
             why = "loads or the start gave it this energy"
             faster = _to_try(why, "max_speed", RAISED * speed, "m/s")
             raise self._error(body, what, self._shorter_step(body) or faster)
-        extent = float(run.model.spheres.extent[body])
+        extent = float(run.model.geometry.extents(run.model)[body])
         allowed = FARTHEST * extent / (speed + math.hypot(*motion["spin"][body]) * extent)
         shorter = _to_try(f"contacts allow {allowed:.3g} s", "step", 0.5 * allowed, "s")
         what += ", too far in a step to follow its contacts"

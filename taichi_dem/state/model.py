@@ -16,7 +16,13 @@ from taichi_dem.materials.bond_rules import per_bond
 from taichi_dem.materials.material import harmless
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors, components
-from taichi_dem.mesh.topology import ContactSpheres, body_properties, edge_colours, topology_of
+from taichi_dem.mesh.topology import (
+    ContactSpheres,
+    body_properties,
+    edge_colours,
+    spheres_of_faces,
+    topology_of,
+)
 
 #: Roles that take one effect, in the order in which effects are listed, bound and reported.
 SINGLE = ("bond", "tension", "shear", "dashpot", "friction", "contact")
@@ -109,7 +115,7 @@ class Model:
     @cached_property
     def spheres(self) -> ContactSpheres:
         """``ContactSpheres`` of every face; with contact only."""
-        return self.geometry.spheres(self)
+        return spheres_of_faces(self.mesh, self.centre, self.geometry.divisions)
 
     @cached_property
     def dashpot_rates(self) -> np.ndarray:

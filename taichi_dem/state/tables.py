@@ -2,7 +2,6 @@
 
 from typing import Any, NamedTuple
 
-import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
@@ -94,15 +93,16 @@ class Tables:
     bond_slots: faces of a bond as 4 * body + local face, master first; bond_frame: rows normal, xi,
     eta in the master's body frame; vertex_master (face frame), vertex_slave (body frame) [m]: an
     entry a contact unit. neighbour, face_bond: behind local face f of a body, entry 4 * body + f,
-    or -1. bond_pair: row of a bond's materials in the table of a law. extent: of the ball around a
-    body's spheres [m]. on_demand: whether laws are evaluated only where they act.
+    or -1. bond_pair: row of a bond's materials in the table of a law. extent: within which
+    all of a body lies that can touch [m]. on_demand: whether laws are only evaluated where they
+    act.
     """
 
     constant_fields = (
         *("body_count", "bond_count", "mass", "mass_inverse", "radius", "extent", "inertia"),
         *("inertia_inverse", "bond_slots", "bond_frame", "bond_stiffness", "unit_area"),
-        *("vertex_master", "vertex_slave", "neighbour", "face_bond", "sphere", "cluster"),
-        *("face_spheres", "material", "bond_pair"),
+        *("vertex_master", "vertex_slave", "neighbour", "face_bond", "material"),
+        *("face_spheres", "bond_pair"),
     )
 
     # Bound effects by role; null objects where the scene lists none, contact is None then.
@@ -128,8 +128,8 @@ class Tables:
         self.has_contact = self.contact is not None
         if self.has_contact:
             self.effects = (*self.effects, geometry)
-        if self.has_contact:
-            self._declare_spheres(self.capacity)
+            self.face_spheres = ti.field(ti.i32, shape=())
+            self.extent = ti.field(real, shape=self.capacity.bodies)
 
     @property
     def drives(self) -> tuple[tuple[Any, int, int, int], ...]:
@@ -158,12 +158,6 @@ class Tables:
         self.neighbour = ti.field(ti.i32, shape=capacity.faces)
         self.face_bond = ti.field(ti.i32, shape=capacity.faces)
 
-    def _declare_spheres(self, capacity):
-        self.face_spheres = ti.field(ti.i32, shape=())
-        self.sphere = ti.Vector.field(4, real, shape=capacity.spheres)
-        self.cluster = ti.Vector.field(4, real, shape=capacity.faces)
-        self.extent = ti.field(real, shape=capacity.bodies)
-
     def upload(self, model: Model) -> None:
         """Take over a model; all fields are zero before."""
         assign(self.body_count, model.body_count)
@@ -178,7 +172,8 @@ class Tables:
         assign(self.material, of_body)
         assign(self.bond_pair, MOST * of_body[top.master] + of_body[top.slave])
         if self.has_contact:
-            self._load_spheres(model.spheres)
+            assign(self.face_spheres, model.geometry.face_spheres)
+            assign(self.extent, model.geometry.extents(model))
         for effect in self.effects:
             effect.upload_scene(model)
 
@@ -207,10 +202,3 @@ class Tables:
             on_master = on_master - model.start_openings[:, None]
         assign(self.vertex_master, on_master.reshape(-1, 3))
         assign(self.vertex_slave, bonds["on_slave"].reshape(-1, 3))
-
-    def _load_spheres(self, spheres):
-        ball = np.concatenate([spheres.centre, spheres.radius[..., None]], axis=-1)
-        assign(self.face_spheres, spheres.per_face)
-        assign(self.sphere, ball.reshape(-1, 4))
-        assign(self.cluster, spheres.cluster.reshape(-1, 4))
-        assign(self.extent, spheres.extent)

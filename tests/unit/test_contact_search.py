@@ -58,8 +58,8 @@ def listed(simulation):
 
 def spheres_now(simulation):
     """Of every sphere: its body, place and radius [m], and since which tick its face is free."""
-    motion, sphere = simulation.state.motion(), simulation.values(simulation.tables.sphere)
-    size = simulation.model.spheres.per_face
+    motion, sphere = simulation.state.motion(), simulation.values(simulation.tables.geometry.sphere)
+    size = simulation.model.geometry.face_spheres
     body = np.arange(len(sphere)) // (4 * size)
     turned = np.einsum("nij,nj->ni", motion["rotation"][body], sphere[:, :3])
     place = turned + motion["position"][body]
