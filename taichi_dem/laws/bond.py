@@ -99,6 +99,11 @@ class Softening(TensionLaw):
         """Share of the fracture energy that is spent, 0 intact to 1 failed."""
         return self.spent(m, u, stiffness) / (0.5 * self.law[m, 0] * self.law[m, 1])
 
+    @ti.func
+    def reach(self, m, u):
+        """Largest opening over that at failure."""
+        return self.unit[u][0] / self.law[m, 1]
+
 
 @ti.data_oriented
 class ShearSlip(ShearLaw):
@@ -218,6 +223,11 @@ class Separable(BondLaw):
     def damage(self, m, u, stiffness):
         """0 intact to 1 failed."""
         return self.tension.damage(m, u, stiffness[0])
+
+    @ti.func
+    def reach(self, m, u):
+        """That of the law of tension."""
+        return self.tension.reach(m, u)
 
     @ti.func
     def acted(self, m, u, stiffness):

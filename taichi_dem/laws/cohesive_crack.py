@@ -54,7 +54,7 @@ class CohesiveCrack(DamageLaw):
         return strength, cohesion, NEAR * least, material.friction, 2.0 * material.fracture_energy
 
     def declare(self, capacity: Capacity) -> None:
-        """Damage [-], energy spent [J/m^2], direction [-] and residual slip [m] of every unit."""
+        """Damage [-], energy spent [J/m^2], direction or reach [-], residual slip [m] of units."""
         self.unit = ti.Vector.field(3, ti.f64, shape=capacity.units)
         # By itself: every unit is asked for it at every step.
         self.slip = ti.Vector.field(2, ti.f64, shape=capacity.units)
@@ -143,7 +143,9 @@ class CohesiveCrack(DamageLaw):
             if damage > unit[0]:
                 spent = begin * (_spent(damage, steep) - _spent(unit[0], steep))
                 unit[0], unit[1] = damage, unit[1] + spent
-                if direction > 0.0:
+                if damage >= 1.0:
+                    unit[2] = size / (1.0 + _END * steep)
+                elif direction > 0.0:
                     unit[2] = direction
         return unit
 

@@ -52,6 +52,11 @@ class UnitLaw(Effect):
         return 0.0
 
     @ti.func
+    def reach(self, m, u):
+        """Jump at which the unit failed over the one at which it had to; below 1 while it holds."""
+        return 0.0
+
+    @ti.func
     def residual_slip(self, m, u):
         """Sliding (2,) that stays when the traction is gone, in the face frame [m]."""
         return vec2(0.0)

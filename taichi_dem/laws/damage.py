@@ -9,7 +9,8 @@ from taichi_dem.laws.contracts import BondLaw
 class DamageLaw(BondLaw):
     """Base of laws that keep of every unit ``unit``: its damage [-], the energy spent [J/m^2].
 
-    A law declares ``unit``, a field of vectors, and may keep more in it.
+    A law declares ``unit``, a field of vectors of three. The last is the ``reach`` of a failed
+    unit, and what a law likes below 1 of one that holds.
     """
 
     unit: ti.MatrixField
@@ -28,3 +29,8 @@ class DamageLaw(BondLaw):
     def damage(self, m, u, stiffness):
         """0 intact to 1 failed."""
         return self.unit[u][0]
+
+    @ti.func
+    def reach(self, m, u):
+        """Jump at which the unit failed over the one at which it had to; at most 1 before."""
+        return self.unit[u][2]

@@ -66,8 +66,8 @@ class MixedMode(DamageLaw):
         return (*strengths, *energies, self.exponent / _QUARTER)
 
     def declare(self, capacity: Capacity) -> None:
-        """Damage [-] of every unit, and energy per area that it has spent [J/m^2]."""
-        self.unit = ti.Vector.field(2, ti.f64, shape=capacity.units)
+        """Damage [-] of every unit, energy per area that it has spent [J/m^2], and its reach."""
+        self.unit = ti.Vector.field(3, ti.f64, shape=capacity.units)
 
     @ti.func
     def _limits(self, m, stiffness, jump):
@@ -112,7 +112,7 @@ class MixedMode(DamageLaw):
             if damage > unit[0]:
                 before = _way(unit[0], begin / end)
                 spent = 0.5 * end * (_way(damage, begin / end) - before)
-                unit = vec2(damage, unit[1] + spent)
+                unit = vec3(damage, unit[1] + spent, ti.sqrt(energy / end))
                 self.unit[u] = unit
         return unit[0]
 

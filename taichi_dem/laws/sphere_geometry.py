@@ -49,7 +49,7 @@ class SphereGeometry(Geometry):
         self.sphere = ti.Vector.field(4, real, shape=capacity.spheres)
         self.cluster = ti.Vector.field(4, real, shape=capacity.faces)
 
-    def load(self, model: Model) -> None:
+    def upload(self, model: Model) -> None:
         """Load the spheres of a scene."""
         spheres = model.spheres
         ball = np.concatenate([spheres.centre, spheres.radius[..., None]], axis=-1)

@@ -33,13 +33,13 @@ PAIR = np.dtype(
         *(("heat", float, 4), ("spent", float), ("step", float), ("leverage", float, (3, 3))),
     ]
 )
-#: Record of a bond: its energies [J], mean damage, which parts of its law acted, and largest slip
-#: of its units [m].
+#: Record of a bond: its energies [J], mean damage, which parts of its law acted, largest slip of
+#: its units [m], and how late they failed.
 BOND = np.dtype(
     [
         *(("strain", float), ("dashpot", float), ("slip", float), ("release", float)),
         *(("softening", float), ("damage", float), ("acted", float, PARTS)),
-        ("residual_slip", float),
+        *(("residual_slip", float), ("reach", float)),
     ]
 )
 
@@ -274,11 +274,15 @@ class Readings:
         """Largest residual slip of the units of every bond that holds [m], (n,)."""
         return self._bonds()["residual_slip"].copy()
 
+    def reach(self) -> np.ndarray:
+        """Largest jump of a unit of every bond as it failed, over that at which it had to, (n,)."""
+        return self._bonds()["reach"].copy()
+
     @ti.func
     def _visit_bond(self, table: ti.template(), b):
         # Each place is written once: to add to it takes longer, and what a kernel does not write
         # into an array that it does not read is not zero on a card.
-        energy, drag, spent, damage, slip = 0.0, 0.0, 0.0, 1.0, 0.0
+        energy, drag, spent, damage, slip, reach = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0
         stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
         heat, acted = vec2(0.0), ti.cast(0, ti.i32)
         if ti.static(self.step.bonds.has_dashpot):
@@ -289,6 +293,7 @@ class Readings:
             u = 3 * b + q
             spent += self.tables.unit_area[b] * self.tables.bond.spent(m, u, stiffness)
             acted |= ti.cast(self.tables.bond.acted(m, u, stiffness), ti.i32)
+            reach = ti.max(reach, self.tables.bond.reach(m, u))
         if self.state.broken_tick[b] < 0:
             motion = self.state.bond_motion(b)
             energy, damage = self.step.bonds.energy(b, motion), 0.0
@@ -302,7 +307,7 @@ class Readings:
         table[b, at.strain], table[b, at.dashpot] = energy, drag
         table[b, at.slip], table[b, at.release] = heat[0], heat[1]
         table[b, at.softening], table[b, at.damage] = spent, damage
-        table[b, at.residual_slip] = slip
+        table[b, at.residual_slip], table[b, at.reach] = slip, reach
         for part in ti.static(range(PARTS)):
             table[b, at.acted + part] = ti.cast((acted >> part) & 1, ti.f64)
 

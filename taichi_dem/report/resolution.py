@@ -186,7 +186,8 @@ class StepResolution(Kept):
 
     def findings(self) -> tuple[str, ...]:
         """Sentences about dashpots and failures that the step did not resolve; may be empty."""
-        worse = -self.share, self._openings_at_failure(), -self._contact_shares(), self.taken
+        late = np.where(self.run.state.broken(), self.run.readings.reach(), 0.0)
+        worse = -self.share, late, -self._contact_shares(), self.taken
         found = (_too_long(*look) for look in zip(worse, _ALLOWED, _TOO_LONG))
         unstable = self._unstable(self.over)
         return tuple(filter(None, (*unstable, *found, self._sweeps(), self._levels())))
@@ -229,15 +230,6 @@ class StepResolution(Kept):
             # A body without dashpots and of no recorded step gives no number, and keeps all.
             x = np.fmax(1.0, 2.0 * self.fastest * self.step)
         return np.minimum(self.pair_share, np.where(acted, 1.0 / x, 1.0))
-
-    def _openings_at_failure(self):
-        """Largest opening of the units of every bond that failed over the failure opening, (b,)."""
-        model, units = self.run.model, self.run.state.fields().get("softening_unit")
-        if units is None:
-            return np.zeros(model.bond_count)
-        widest = values(units, slice(3 * model.bond_count))[:, 0].reshape(-1, 3).max(axis=1)
-        opening = model.of_bonds(lambda material: material.failure_opening)
-        return np.where(self.run.state.broken(), widest / opening, 0.0)
 
 
 def _too_long(values, allowed, words):

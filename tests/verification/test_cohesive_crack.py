@@ -17,6 +17,7 @@ import pytest
 
 from taichi_dem import CONCRETE, effects
 from taichi_dem.mesh.shapes import pair as pair_mesh
+from taichi_dem.report.resolution import MOST_OPENING, StepResolution
 from tests.probe import STEP, BondProbe
 from tests.verification.test_bond_law import EDGE, EPS, K_N, K_S, OPENING_ERROR, unit_openings
 
@@ -212,3 +213,16 @@ def test_a_unit_spends_at_least_what_it_holds_at_its_onset():
     brittle.open((1.0 + 1e-4) * way.onset)
     assert brittle.broken
     assert brittle.spent() == pytest.approx(3 * [least], rel=1e-5)
+
+
+@pytest.mark.parametrize("late", [1.2, 1.3])
+def test_a_bond_that_fails_beyond_a_quarter_more_than_its_last_opening_is_told(pair, late):
+    """In one step from a tenth before that opening, as a step that is too long makes it."""
+    way = Way(0)
+    last = way.corners[-1] * way.onset
+    pair.open(0.9 * last)
+    pair.open(late * last)
+    assert pair.broken
+    assert pair.simulation.readings.reach() == pytest.approx([late], rel=1e-9)
+    told = StepResolution(pair.simulation.parts).findings()
+    assert len(told) == (late > MOST_OPENING)
