@@ -2,14 +2,12 @@
 
 import json
 import re
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
 
 from docs.site.live.build import OUT, PAGES, built, source
-from taichi_dem import ImplicitDashpots, Material, Scene, Simulation, Uniform, checked_mesh, effects
+from taichi_dem import Material, Scene, Simulation, Uniform, checked_mesh, effects
 from tests.structures import filled
 from tests.viewer.test_pages import unpacked
 
