@@ -247,7 +247,7 @@ def edge_colours(links: np.ndarray, body_count: int) -> np.ndarray:
     # Greedy; before a new colour is taken, a chain of two colours is flipped if that frees one.
     # Four bonds a body need at most five colours.
     given = _Colouring(links, body_count)
-    first, second, taken = *given.ends, given.taken
+    (first, second), taken = given.ends, given.taken
     for link, i, j in zip(range(len(first)), first, second):
         both = taken[i] | taken[j]
         colour = (~both & (both + 1)).bit_length() - 1
