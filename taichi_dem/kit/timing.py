@@ -1,7 +1,8 @@
 """CPU time of this process and of a piece of work."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from statistics import median
 from typing import Any
 
 from taichi_dem.kit import runtime
@@ -29,3 +30,12 @@ def seconds_of(work: Callable, *arguments: Any) -> float:
     started = clock()
     work(*arguments)
     return clock() - started
+
+
+def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Median, and the 95 % interval of the median by order; fewer than six have their extremes."""
+    from scipy.stats import quantile_test
+
+    ends = (min(values), max(values))
+    interval = quantile_test(values, p=0.5).confidence_interval(0.95) if len(values) > 5 else ends
+    return median(values), *(float(end) for end in interval)
