@@ -123,7 +123,12 @@ def bench_scene(name, size):
     gas = effects.GasPressure(group="left")
     if name == "rubble":
         corners = mesh.points[mesh.tetrahedra]
-        mesh = checked_mesh(corners.reshape(-1, 3), np.arange(4 * len(corners)).reshape(-1, 4), {})
+        mesh = checked_mesh(
+            corners.reshape(-1, 3),
+            np.arange(4 * len(corners)).reshape(-1, 4),
+            {},
+            keep_coincident=True,
+        )
     if name in ("rubble", "breaking"):
         rate = -PRESSED if name == "rubble" else TORN
         scene = Scene(mesh, CONCRETE, "auto", velocity=lambda x: rate * (x - x.mean(axis=0)))

@@ -36,6 +36,7 @@ def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
     """Median, and the 95 % interval of the median by order; fewer than six have their extremes."""
     from scipy.stats import quantile_test
 
-    ends = (min(values), max(values))
-    interval = quantile_test(values, p=0.5).confidence_interval(0.95) if len(values) > 5 else ends
-    return median(values), *(float(end) for end in interval)
+    low, high = min(values), max(values)
+    if len(values) > 5:
+        low, high = map(float, quantile_test(values, p=0.5).confidence_interval(0.95))
+    return median(values), low, high
