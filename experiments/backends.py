@@ -1,66 +1,90 @@
-"""How many steps a second does each back end make, and what bounds them?
+"""How many steps a second, on each device of this machine, and what bounds them?
 
-Bars of tetrahedra under gas pressure are stepped by three methods: on one CPU thread, on all CPU
-threads, and on each GPU back end found here. Two lines bound the measured rates: the bytes of a
-step at the bandwidth of memory, and the rate of the smallest scene, in which the device waits for
-launches and for reads by the host.
+Five scenes from the worst to the easiest: free bodies pressed together, a block that falls to
+pieces, one that only might, one without contact, one without contact by explicit steps. Each runs
+on one CPU thread, on all, and on each GPU back end found here, at growing size. A step moves at
+least some bytes, each number once; copies of a large array, measured in the same run, say how long
+that must take.
 
-    python experiments/backends.py           # minutes on a CPU and on a graphics card
+    make bench                              # after the bench; writes docs/bench.md
     python experiments/backends.py --quick
 
-Mesa's lavapipe, a Vulkan driver that runs on the CPU, is slow and refuses large scenes.
+Rates are of the clock, medians of n timings with the 95 % interval of the median. Equal digests are
+equal bits of all bodies. Mesa's lavapipe, a Vulkan driver that runs on the CPU, is slow and refuses
+large scenes.
 
 Writes backends.png, backends.csv and summary.json to results/backends/.
 """
 
+import re
 import sys
 import time
-from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import taichi as ti
 
-from cases.blast import METHODS as BLAST_METHODS
 from cases.blast import paper_effects
-from taichi_dem import CONCRETE, InputError, Scene, Simulation, effects, runtime
-from taichi_dem.kit import backend, study
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    InputError,
+    Scene,
+    Simulation,
+    Uniform,
+    checked_mesh,
+    effects,
+)
+from taichi_dem.kit import backend, runtime, study
+from taichi_dem.kit.allocation import values
+from taichi_dem.kit.checkpoint import digest
 from taichi_dem.kit.field_memory import FieldMemory
-from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, RED, picture
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, RED, picture
 from taichi_dem.kit.progress_bar import ProgressBar
+from taichi_dem.kit.timing import median_interval
 from taichi_dem.mesh.shapes import bar, in_space_order
 
 NAME = "backends"
-METHODS = {
-    "explicit_limited": "explicit, one step for all",
-    "multirate_controlled": "explicit, a step for each",
-    "implicit": "dashpots solved together",
+#: Edge of a box [m]; steps with dashpots solved and without [s]; strain rates [1/s].
+BOX, SOLVED, LIMITED, PRESSED, TORN = 0.05, 4e-7, 1e-7, 100.0, 100.0
+WORDS = {
+    "rubble": "free bodies, pressed together",
+    "breaking": "a block that falls to pieces",
+    "contact": "a block struck by gas",
+    "solved": "the same without contact",
+    "bonds": "the same, explicit steps",
 }
-#: Colour and words of a place.
+#: Colour and words of a place; marker of a scene.
 LOOK = {
     "cpu 1": (RED, "CPU, one thread"),
     "cpu": (BLACK, "CPU, all threads"),
     "vulkan": (BLUE, "Vulkan"),
     "cuda": (GREEN, "CUDA"),
 }
+MARKS = dict(zip(WORDS, "v^so*"))
 SETTINGS = {
     # Bars of 2k x k x k boxes of six tetrahedra.
-    "sizes": ((4, 8, 13, 20), (2, 3), study.several(study.whole(1, 60)), "boxes along a width"),
+    "sizes": ((4, 9, 20), (2, 3), study.several(study.whole(1, 60)), "boxes along a width"),
     "places": (None, ["cpu 1", "cpu"], study.several(study.one_of(LOOK)), "devices; default all"),
-    "methods": ([*METHODS], ["explicit_limited"], study.several(study.one_of(METHODS)), "by comma"),
-    "steps": (20, 5, study.whole(1, 10_000), "steps in one timing, default 20"),
-    "repeats": (3, 1, study.whole(1, 100), "timings, of which the fastest counts, default 3"),
+    "scenes": ([*WORDS], ["contact", "bonds"], study.several(study.one_of(WORDS)), "by comma"),
+    "updates": (1e6, 2e4, study.number(1.0, 1e12), "bodies advanced in one timing"),
+    "repeats": (7, 1, study.whole(1, 100), "timings, default 7"),
 }
 TABLE = study.Table(
-    place=("place", "place"),
-    method=("method", "method"),
+    scene=("scene", "scene"),
     bodies=("bodies", "bodies", ","),
+    place=("place", "place"),
     steps_per_s=("rate", "steps/s", ".3g"),
-    floor_per_s=("floor", "by bytes", ".3g"),
+    low=("low", "from", ".3g"),
+    high=("high", "to", ".3g"),
+    timings=("n", "n"),
+    evaluations=("evaluations", "M evaluations/s", ".3g"),
+    bytes_a_step=("megabytes", "MB/step", ".3g"),
+    share_of_copy=("share", "of copy", ".2f"),
+    broken=("broken", "broken", ","),
+    digest=("digest", "digest"),
 )
-options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
-#: Edge of a box [m].
-BOX = 0.05
 #: What every step writes of bodies and bonds, and what it reads besides; also the laws of bonds.
 WRITTEN = "slot position orientation velocity spin angular_momentum bond_drag".split()
 READ = (
@@ -73,50 +97,98 @@ READ = (
 #: symmetric inverse inertia (6) and inverse mass (1). It writes the twist of the visit (6) and
 #: those of both bodies (12): 74 numbers.
 VISIT_BYTES = 8 + 8 * 74
+#: A pair reads place, turn, velocity, spin, inverse inertia and mass of two bodies: 40 numbers.
+PAIR_BYTES = 8 + 8 * 40
 #: Numbers of an array far beyond every cache, numbers that one instruction may take, and copies.
 LARGE, LANES, COPIES = 1 << 24, 8, 5
+
+
+def options_parser():
+    """Options of this script."""
+    made = study.parser(NAME, __doc__, settings=SETTINGS)
+    made.add_argument("--page", help="page of Markdown whose table is renewed")
+    return made
 
 
 def places():
     """Name, architecture and threads of what kernels can run on here."""
     cores = runtime.usable_cores()
-    found = [("cpu 1", "cpu", 1), *([("cpu", "cpu", cores)] if cores > 1 else [])]
-    return [*found, *((name, name, 1) for name in backend.GPUS if backend.is_present(name))]
+    named = [("cpu 1", "cpu", 1), *([("cpu", "cpu", cores)] if cores > 1 else [])]
+    return [*named, *((name, name, 1) for name in backend.GPUS if backend.is_present(name))]
 
 
-def measured(place, method, size, options):
-    """Steps a second of a bar at a place, and as many as the bytes of a step allow."""
-    name, arch, threads = place
-    job = {"method": method, "size": size, "steps": options.steps, "repeats": options.repeats}
-    title = f"on {threads} threads of {arch}"
-    found = study.call_in_process(whole_steps, arch=arch, threads=threads, title=title, **job)
-    rate, bodies = 1.0 / min(found["seconds"]), found["bodies"]
-    floor = found["bandwidth"] / found["bytes"]
-    return SimpleNamespace(place=name, method=method, bodies=bodies, rate=rate, floor=floor)
-
-
-def whole_steps(method, size, steps, repeats):
-    """Whole steps of a bar by the parallel driver, two of them to warm up; for a JSON file.
-
-    seconds: of a step, one a repeat. bytes: least ones of a step. bandwidth: of memory [B/s].
-    """
-    blown = [e for e in paper_effects() if e.name != "gas_pressure"]
+def bench_scene(name, size):
+    """A scene of so many boxes along its width, and the method of its steps."""
     mesh = in_space_order(bar(2 * BOX * size, BOX * size, (2 * size, size, size)))
-    scene = Scene(mesh, CONCRETE, [*blown, effects.GasPressure(group="left")])
-    make, step = BLAST_METHODS[method]
-    simulation = Simulation(scene, make(step), "parallel")
-    simulation.advance_to(2)
+    gas = effects.GasPressure(group="left")
+    if name == "rubble":
+        corners = mesh.points[mesh.tetrahedra]
+        mesh = checked_mesh(
+            corners.reshape(-1, 3),
+            np.arange(4 * len(corners)).reshape(-1, 4),
+            {},
+            keep_coincident=True,
+        )
+    if name in ("rubble", "breaking"):
+        rate = -PRESSED if name == "rubble" else TORN
+        scene = Scene(mesh, CONCRETE, "auto", velocity=lambda x: rate * (x - x.mean(axis=0)))
+    elif name == "contact":
+        scene = Scene(mesh, CONCRETE, "auto", loads=[gas])
+    else:
+        alone = ("bond_damping", "softening", "shear_slip")
+        scene = Scene(mesh, CONCRETE, [*(e for e in paper_effects() if e.name in alone), gas])
+    return scene, Uniform(LIMITED, dashpot="limited") if name == "bonds" else ImplicitDashpots(
+        SOLVED
+    )
+
+
+def measured(place, name, size, options):
+    """A row of the table: a scene of a size at a place."""
+    label, arch, threads = place
+    job = {"name": name, "size": size, "updates": options.updates, "repeats": options.repeats}
+    title = f"on {threads} threads of {arch}"
+    row = study.call_in_process(whole_steps, arch=arch, threads=threads, title=title, **job)
+    rate, low, high = median_interval([1.0 / seconds for seconds in row["seconds"]])
+    return SimpleNamespace(
+        scene=name,
+        place=label,
+        rate=rate,
+        low=low,
+        high=high,
+        n=options.repeats,
+        evaluations=1e-6 * rate * row["evaluations"],
+        megabytes=1e-6 * row["bytes"],
+        share=rate * row["bytes"] / row["bandwidth"],
+        **{key: row[key] for key in ("bodies", "broken", "digest", "bandwidth")},
+    )
+
+
+def whole_steps(name, size, updates, repeats):
+    """Whole steps of a scene by the parallel driver, some to warm up; for a JSON file.
+
+    seconds: of a step, one a repeat. bytes, evaluations: of a step, the least bytes. bandwidth: of
+    memory [B/s].
+    """
+    scene, method = bench_scene(name, size)
+    simulation = Simulation(scene, method, "parallel")
+    model = simulation.model
+    steps = max(1, int(updates / model.body_count))
+    simulation.advance_to(steps)
     seconds, counts = [], counts_of(simulation)
     for k in range(repeats):
         started = time.perf_counter()
-        simulation.advance_to(2 + (k + 1) * steps)
+        simulation.advance_to((k + 2) * steps)
         seconds.append((time.perf_counter() - started) / steps)
-    bonds, visits = (counts_of(simulation) - counts) / (steps * repeats)
+    laws, visits, pairs = (counts_of(simulation) - counts) / (steps * repeats)
     # An evaluated bond stands for its share of a step of all bodies.
-    share, model = bytes_a_step(simulation.engine), simulation.model
-    moved = share * bonds / model.bond_count + VISIT_BYTES * visits
-    found = {"seconds": seconds, "bodies": model.body_count, "bytes": moved}
-    return {**found, "bandwidth": bandwidth()}
+    moved = bytes_a_step(simulation.engine) * laws / max(1, model.bond_count)
+    moved += VISIT_BYTES * visits + bytes_of_pair(simulation.engine) * pairs
+    motion = simulation.state.motion()
+    return {
+        **{"seconds": seconds, "bodies": model.body_count, "bytes": moved},
+        **{"evaluations": laws + visits + pairs, "bandwidth": bandwidth()},
+        **{"broken": simulation.report().broken_faces, "digest": digest(*motion.values())[:8]},
+    }
 
 
 def bytes_a_step(engine):
@@ -128,11 +200,20 @@ def bytes_a_step(engine):
     return sum(engine.values(fields[name]).nbytes for name in moved if name in fields)
 
 
+def bytes_of_pair(engine):
+    """Least bytes that a visit of a near pair moves: bodies, its row, pending impulses."""
+    if engine.contacts is None:
+        return 0
+    store = engine.contacts.store
+    row = [*store.columns.members, store.impulse, store.impulse, store.heat]
+    return PAIR_BYTES + 2 * sum(values(field, slice(1)).nbytes for field in row)
+
+
 def counts_of(simulation):
-    """Numbers of evaluated bonds, and of visits of bonds in sweeps, since the start."""
+    """Numbers since the start: evaluated laws of bonds, visits of bonds in sweeps, pairs."""
     counts = simulation.values(simulation.schedule.evaluations).tolist()
     # Those of the third count are both.
-    return np.array([counts[5], counts[2] - counts[5]])
+    return np.array([counts[5], counts[2] - counts[5], counts[3]])
 
 
 def bandwidth():
@@ -155,36 +236,44 @@ def copy(a: ti.template(), b: ti.template()):
         b[k] = a[k]
 
 
-def draw(path, rows, methods):
-    """Steps a second over bodies, a panel a method, a colour a place."""
-    with picture(path, 1, len(methods), size=(3.2 * len(methods) + 1.0, 4.2)) as (figure, panels):
-        for axes, method in zip(panels if len(methods) > 1 else [panels], methods):
-            for name in dict.fromkeys(row.place for row in rows):
-                mine = [row for row in rows if (row.place, row.method) == (name, method)]
-                if mine:
-                    bodies = [row.bodies for row in mine]
-                    colour, words = LOOK[name]
-                    axes.plot(bodies, [row.rate for row in mine], "o-", color=colour, label=words)
-                    axes.plot(bodies, [row.floor for row in mine], ":", color=colour)
-                    axes.axhline(mine[0].rate, color=colour, lw=0.6, ls="--")
-            axes.plot([], [], ":", color=GREY, label="bound by bytes")
-            axes.plot([], [], "--", lw=0.6, color=GREY, label="rate of the smallest scene")
-            axes.set(xscale="log", yscale="log", title=METHODS[method])
-            axes.set(xlabel="bodies [1]", ylabel="steps a second [1/s]")
-        figure.legend(
-            *axes.get_legend_handles_labels(), loc="outside lower center", ncols=2 * len(methods)
-        )
+def draw(path, rows):
+    """Roofline: bytes moved a second over bodies, under the bandwidth of each place."""
+    with picture(path, 1, 1, size=(7.2, 4.6)) as (_, axes):
+        for place in dict.fromkeys(row.place for row in rows):
+            colour, words = LOOK[place]
+            own = [row for row in rows if row.place == place]
+            roof = 1e-9 * max(row.bandwidth for row in own)
+            axes.axhline(roof, color=colour, lw=0.8, ls="--", label=f"copies, {words}")
+            for scene in dict.fromkeys(row.scene for row in own):
+                some = [row for row in own if row.scene == scene]
+                moved = [1e-3 * row.rate * row.megabytes for row in some]
+                look = {"color": colour, "marker": MARKS[scene], "ms": 5, "lw": 0.8}
+                axes.plot([row.bodies for row in some], moved, **look)
+        for scene in dict.fromkeys(row.scene for row in rows):
+            axes.plot([], [], MARKS[scene], color=BLACK, label=WORDS[scene])
+        axes.set(xscale="log", yscale="log", xlabel="bodies", ylabel="least bytes moved [GB/s]")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+
+
+def renewed(page, rows):
+    """A page of Markdown with another table, and another first line that says where it is from."""
+    header, cells = TABLE.cells(TABLE.rows(rows))
+    lines = [header, ["---"] * len(header), *cells]
+    table = "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
+    place = f"{study.processor()}, {runtime.usable_cores()} cores, {time.strftime('%d %B %Y')}"
+    page = re.sub(r"(?m)^Measured on .*$", f"Measured on {place}:", page, count=1)
+    return re.sub(r"(?m)(^\|.*\n)+", table, page, count=1)
 
 
 def run(options):
     """Measure all places, one after the other; table, picture, figures."""
     at, rows = study.output_paths(options.out), []
     jobs = [
-        (place, method, size)
+        (place, name, size)
+        for name in options.scenes
+        for size in options.sizes
         for place in places()
         if place[0] in (options.places or LOOK)
-        for method in options.methods
-        for size in options.sizes
     ]
     if not jobs:
         raise InputError(f"places must have one that answers here, got {', '.join(options.places)}")
@@ -198,12 +287,15 @@ def run(options):
                 print(f"{job[0][0]}, {job[1]}, size {job[2]}: {reason}")
     study.write_rows(at("backends.csv"), TABLE.rows(rows))
     TABLE.show(TABLE.rows(rows))
-    draw(at("backends.png"), rows, options.methods)
+    draw(at("backends.png"), rows)
+    if options.page:
+        page = Path(options.page)
+        page.write_text(renewed(page.read_text(encoding="utf-8"), rows), encoding="utf-8")
     figures = {}
     for row in rows:
-        name = f"{row.place.replace(' ', '_')}_{row.method}_{row.bodies}"
+        name = f"{row.place.replace(' ', '_')}_{row.scene}_{row.bodies}"
         figures[f"steps_per_s_{name}"] = row.rate, "1/s"
-        figures[f"share_of_floor_{name}"] = row.rate / row.floor, "1"
+        figures[f"share_of_copy_{name}"] = row.share, "1"
     study.finish(options, NAME, figures, 0.0)
 
 

@@ -4,11 +4,11 @@
     python experiments/bench.py --quick # fewer figures
 
 Figures are CPU time of one core unless they say otherwise, and wall time with --arch cuda, without
-compiling. They are medians of repeats, with their spread; candidates of one part take turns.
+compiling. They are medians of repeats, with the 95 % interval; candidates of one part take turns.
 
-The table also has what other programs take, measured on other machines, and the change since the
-last run in this folder of the same kind on such a processor. Adds a line with all of it to
-bench.jsonl in results/.
+The table also has the change since the last run in this folder of the same kind on such a
+processor. Adds a line with all of it to bench.jsonl in results/. ``backends.py`` has scenes of
+growing size on all devices, ``bench_others.py`` other programs.
 """
 
 import json
@@ -20,16 +20,10 @@ from _bench import PARTS
 from taichi_dem.kit import runtime, study
 from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.provenance import git
+from taichi_dem.kit.timing import median_interval
 
 NAME = "bench"
-HEADER = ["work", "ours", "spread", "unit", "change", "wanted", "others'", "by"]
-#: What other programs take for the work of a figure, in its unit; which, and measured where.
-OTHERS = {
-    "spheres, N = 50": (16.0, "LAMMPS, granular spheres (a core with AVX-512, 2026)"),
-    "bonded phase": (40.0, "C++, the same arithmetic in lanes (a core with AVX-512, 2026)"),
-    "paper's problem, implicit": (0.75, "C++, the same method (0.6 to 0.9 s, AVX-512, 2026)"),
-    "paper's problem, l = 1e-08 m, extrapolated": (89.0, "C++, the paper's rule (AVX-512, 2026)"),
-}
+HEADER = ["work", "median", "95 %", "unit", "change", "wanted"]
 
 
 def options_parser():
@@ -61,9 +55,8 @@ def run(options):
 def row_of(one, before):
     """Cells of a figure in the table; before: its median in an earlier run, if any."""
     change = f"{100.0 * (one.middle / before - 1.0):+.0f} %" if before else ""
-    spread = f"{min(one.values):.3g} .. {max(one.values):.3g}"
-    value, program = OTHERS.get(one.name, ("", ""))
-    return one.name, f"{one.middle:.3g}", spread, one.unit, change, one.wanted, value, program
+    middle, low, high = median_interval(one.values)
+    return one.name, f"{middle:.3g}", f"{low:.3g} .. {high:.3g}", one.unit, change, one.wanted
 
 
 def medians_before(path, made_by):

@@ -31,6 +31,7 @@ PAGES = read_entries(HERE / ENTRIES)
 #: Scripts that are no experiment of their own, and why.
 TOOLS = {
     "bench": "measures speed, `make bench`",
+    "bench_others": "measures other programs beside, `make bench-others`",
     "gallery": "runs the others",
     "make_meshes": "makes the meshes, `make mesh`",
 }

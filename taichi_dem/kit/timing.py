@@ -1,7 +1,8 @@
 """CPU time of this process and of a piece of work."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from statistics import median
 from typing import Any
 
 from taichi_dem.kit import runtime
@@ -29,3 +30,13 @@ def seconds_of(work: Callable, *arguments: Any) -> float:
     started = clock()
     work(*arguments)
     return clock() - started
+
+
+def median_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Median, and the 95 % interval of the median by order; fewer than six have their extremes."""
+    from scipy.stats import quantile_test
+
+    low, high = min(values), max(values)
+    if len(values) > 5:
+        low, high = map(float, quantile_test(values, p=0.5).confidence_interval(0.95))
+    return median(values), low, high

@@ -5,15 +5,18 @@ import json
 import math
 from fnmatch import filter as matching
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
+import backends
 import bench
 from _bench import Figure
 from taichi_dem.kit import runtime
 from taichi_dem.kit.study.entries import ENTRIES, read_entries
+from taichi_dem.kit.timing import median_interval
 from tests.experiments.contract import FOLDER, NAMES, rows_of, start
 from tests.processes import phases_of
 
@@ -97,12 +100,11 @@ def is_drawn(picture):
 
 
 @pytest.mark.slow
-def test_a_quick_bench_measures_waits_beside_other_programs(tmp_path):
+def test_a_quick_bench_measures_waits(tmp_path):
     done = start("bench", "--quick", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     medians = json.loads((tmp_path / "bench.jsonl").read_text())["medians"]
     assert medians["first_scene_cold_seconds"] > medians["second_scene_seconds"] > 0.0
-    assert "LAMMPS" in done.stdout
 
 
 def test_the_bench_tells_the_change_since_the_last_run(tmp_path, monkeypatch, capsys):
@@ -113,6 +115,24 @@ def test_the_bench_tells_the_change_since_the_last_run(tmp_path, monkeypatch, ca
         monkeypatch.setattr(bench, "PARTS", (functools.update_wrapper(part, bench.run),))
         bench.study.main(bench.run, bench.options_parser(), ["--out", str(tmp_path)])
     assert "+50 %" in capsys.readouterr().out
+
+
+def test_the_table_of_speed_replaces_the_one_of_its_page():
+    page = "# Title\n\nMeasured on a toaster:\n\n| a |\n|---|\n| 1 |\n\nText.\n\n| b |\n|---|\n"
+    words = "scene bodies place low high n evaluations megabytes share broken digest".split()
+    row = SimpleNamespace(**dict.fromkeys(words, 0), rate=3)
+    lines = backends.renewed(page, [row]).splitlines()
+    assert lines[0] == "# Title" and "toaster" not in lines[2]
+    assert lines[4].startswith("| scene | bodies |") and lines[6].startswith("| 0 | 0 | 0 | 3 |")
+    assert lines[7:] == ["", "Text.", "", "| b |", "|---|"]
+
+
+@pytest.mark.parametrize("count, low, high", [(5, 0, 4), (6, 0, 5), (9, 1, 7), (21, 5, 15)])
+def test_the_interval_of_a_median_is_that_of_signs(count, low, high):
+    """Each side leaves out at most 2.5 % of the 2^n ways in which values lie about the median."""
+    assert median_interval([*range(count)][::-1]) == ((count - 1) / 2, low, high)
+    if count > 5:
+        assert sum(math.comb(count, k) for k in range(low + 1)) / 2**count <= 0.025
 
 
 @QUICK
