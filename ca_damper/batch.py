@@ -124,8 +124,8 @@ class Batch(LoadedScenes):
         self.count = instance("table", table, SceneTable).count
         given = Fillings(filling, self.count)
         self.most_particles = int(table.column("particles").max())
-        found = given.activated(self.most_particles) if effects == "auto" else (given, ())
-        self.fillings, self.estimates = found
+        active = given.activated(self.most_particles) if effects == "auto" else (given, ())
+        self.fillings, self.estimates = active
         runtime.session()
         self.if_diverged = choice("if_diverged", if_diverged, ("nan", "raise"))
         self.support = mount_of(mount, structure)
@@ -291,7 +291,7 @@ class Batch(LoadedScenes):
         self._recording = None
         self._go(counts * self.steps_per_cycle, np.zeros_like(counts), progress)
         record = self._read_cycles(int(counts.max()))
-        return tuple(one[:count].copy() for one, count in zip(record, counts))
+        return tuple(column[:count].copy() for column, count in zip(record, counts))
 
     def advance(self, steps: Any, progress: Listener | None = None) -> None:
         """Advance every scene by a number of steps without measuring.
@@ -447,7 +447,7 @@ class Batch(LoadedScenes):
 
     def _bound_of_step(self) -> dict[str, Any]:
         """Fields of a Report: the bound of which a scene takes the largest share, and that."""
-        bound = self.fillings.of_scenes(lambda one: (one.step_bound or (np.inf,))[0])
+        bound = self.fillings.of_scenes(lambda filling: (filling.step_bound or (np.inf,))[0])
         shares = self.table.column("dt") / bound
         worst = int(shares.argmax())
         return {

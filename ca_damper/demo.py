@@ -77,10 +77,10 @@ _ENTRY = Entry(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program on a command line, that of the process by default; returns its exit code."""
-    made = study.parser(NAME, __doc__, settings=SETTINGS)
-    made.prog, made.entry = "python -m ca_damper demo", _ENTRY
-    add_options(made)
-    return study.main(lambda options: let_go(options, NAME), made, arguments)
+    parser = study.parser(NAME, __doc__, settings=SETTINGS)
+    parser.prog, parser.entry = "python -m ca_damper demo", _ENTRY
+    add_options(parser)
+    return study.main(lambda options: let_go(options, NAME), parser, arguments)
 
 
 def add_options(made: study.Parser) -> None:
@@ -96,7 +96,7 @@ def let_go(options: Namespace, name: str) -> None:
     shown, rigid = fillings[options.filling], RigidMass()
     counts, starts = sorted({*COUNTS, options.particles}), options.seed + np.arange(options.starts)
     scenes = np.repeat(counts, options.starts), np.tile(starts, len(counts))
-    jobs = [(rigid, counts, options.seed), *((one, *scenes) for one in fillings.values())]
+    jobs = [(rigid, counts, options.seed), *((filling, *scenes) for filling in fillings.values())]
     batches = {job[0].label: _batch(*job, options) for job in jobs}
     at = study.output_paths(options.out)
     titles = "fixed particles", *fillings
@@ -124,7 +124,7 @@ def picture(decays: Mapping[str, Decay], fillings: Sequence[Any], options: Names
         return
     at = study.output_paths(options.out)
     plot_decay(at("decay.png"), decays, options.particles, options.amplitude)
-    fixed, free = (_filmed(one, options) for one in fillings)
+    fixed, free = (_filmed(filling, options) for filling in fillings)
     page = at("view.html") if options.pictures == "all" else None
     draw_films(at("damper.gif"), page, (fixed, free), options)
 

@@ -45,8 +45,8 @@ class Decay:
 
     def decrements(self, count: int) -> tuple[float | None, float | None]:
         """Mean decrement above 12 mm and below 6 mm; None where no cycle is there."""
-        found = [logarithmic_decrement(x) for x in self._of(self.x, count)]
-        size, lost = (np.concatenate(arrays) for arrays in zip(*found))
+        decrements = [logarithmic_decrement(x) for x in self._of(self.x, count)]
+        size, lost = (np.concatenate(arrays) for arrays in zip(*decrements))
         parts = (lost[1e3 * size > _ABOVE], lost[1e3 * size < _BELOW])
         above, below = (float(part.mean()) if len(part) else None for part in parts)
         return above, below

@@ -109,33 +109,33 @@ class Fillings:
                 f"{counted(len(given), 'filling')}"
             )
         # By their words, as those of a user may be without a hash.
-        own = {id(one): one for one in each}
-        own_words = {k: f"{type(one)} {identity_of(check_filling(one))}" for k, one in own.items()}
-        words = [own_words[id(one)] for one in each]
+        own = {id(filling): filling for filling in each}
+        own_words = {k: f"{type(own[k])} {identity_of(check_filling(own[k]))}" for k in own}
+        words = [own_words[id(filling)] for filling in each]
         kinds = dict(zip(words, each))
         self.kinds, places = tuple(kinds.values()), {word: k for k, word in enumerate(kinds)}
         self.which = np.resize([places[word] for word in words], scenes)
         first = self.kinds[0]
-        for one in self.kinds:
-            if (type(one), one.structure.key) != (type(first), first.structure.key):
+        for filling in self.kinds:
+            if (type(filling), filling.structure.key) != (type(first), first.structure.key):
                 raise InputError(
                     "filling must be of one class, with the same rules and effects, in all scenes "
-                    f"of a batch, got {_difference(first, one)}"
+                    f"of a batch, got {_difference(first, filling)}"
                 )
 
     @property
     def structure(self) -> "FillingStructure":
         """What is compiled, with room for the largest."""
-        sizes = [one.structure.sizes for one in self.kinds]
-        most = {name: max(one[name] for one in sizes) for name in sizes[0]}
+        sizes = [filling.structure.sizes for filling in self.kinds]
+        most = {name: max(size[name] for size in sizes) for name in sizes[0]}
         return FillingStructure(self.kinds[0].structure.key, most)
 
     def activated(self, particles: int) -> tuple["Fillings", tuple[Estimate, ...]]:
         """The fillings with the effects that are needed, and estimates of those decided on."""
         if not hasattr(self.kinds[0], "activated"):
             return self, ()
-        chosen, estimates = zip(*(one.activated(particles) for one in self.kinds))
-        if len({one.structure.key for one in chosen}) > 1:
+        chosen, estimates = zip(*(filling.activated(particles) for filling in self.kinds))
+        if len({filling.structure.key for filling in chosen}) > 1:
             raise InputError(
                 'effects must be "listed" where "auto" finds other effects in some fillings of a '
                 "batch than in others, got 'auto'"
@@ -144,8 +144,8 @@ class Fillings:
 
     def left_out(self, particles: int) -> tuple[Estimate, ...]:
         """Estimates of the effects that are not computed."""
-        kinds = [one for one in self.kinds if hasattr(one, "left_out")]
-        return _largest([one.left_out(particles) for one in kinds])
+        kinds = [filling for filling in self.kinds if hasattr(filling, "left_out")]
+        return _largest([filling.left_out(particles) for filling in kinds])
 
     @property
     def one(self) -> Any:
@@ -168,19 +168,19 @@ class Fillings:
 
     def of_scenes(self, value: Any) -> np.ndarray:
         """What a function finds of the filling of each scene, (scenes, ...)."""
-        return np.array([value(one) for one in self.kinds])[self.which]
+        return np.array([value(filling) for filling in self.kinds])[self.which]
 
     def write(self, field: Any, value: Any) -> None:
         """Write what a function finds of each scene to a field, with zeros where it finds fewer."""
-        found = [value(one) for one in self.kinds]
+        values = [value(filling) for filling in self.kinds]
         if hasattr(field, "field_dict"):
-            for name in found[0]:
-                self._write(field.get_member_field(name), [one[name] for one in found])
+            for name in values[0]:
+                self._write(field.get_member_field(name), [numbers[name] for numbers in values])
         else:
-            self._write(field, found)
+            self._write(field, values)
 
-    def _write(self, field, found):
-        parts = [np.asarray(one) for one in found]
+    def _write(self, field, values):
+        parts = [np.asarray(value) for value in values]
         rows = np.zeros((len(parts), *shape_of(field)[1:]), to_numpy_type(field.dtype))
         for k, part in enumerate(parts):
             place: tuple[Any, ...] = (k, *map(slice, part.shape))
@@ -190,14 +190,14 @@ class Fillings:
 
 def _largest(estimates):
     """Of the estimates of each filling, in one order of the effects, the largest of each effect."""
-    return tuple(max(of_one, key=lambda one: one.group) for of_one in zip(*estimates))
+    return tuple(max(of_one, key=lambda estimate: estimate.group) for of_one in zip(*estimates))
 
 
-def _difference(one, other):
+def _difference(first, second):
     """Two fillings in words, those of one class by the options in which they differ."""
-    if type(one) is not type(other):
-        return f"{type(one).__name__} and {type(other).__name__}"
-    mine, others = vars(one), vars(other)
+    if type(first) is not type(second):
+        return f"{type(first).__name__} and {type(second).__name__}"
+    mine, others = vars(first), vars(second)
     names = [name for name in mine if identity_of(mine[name]) != identity_of(others[name])]
     return f"some that differ in {', '.join(names)}"
 

@@ -86,7 +86,7 @@ class FixedMass:
 
     def upload(self, fillings: Fillings) -> None:
         """Take over the mass of a particle of each scene."""
-        fillings.write(self.particle_mass, lambda one: one.particle_mass)
+        fillings.write(self.particle_mass, lambda filling: filling.particle_mass)
 
     @ti.func
     def mass(self, s):

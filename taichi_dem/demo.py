@@ -52,10 +52,10 @@ _ENTRY = Entry(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program on a command line, that of the process by default; returns its exit code."""
-    made = study.parser(NAME, __doc__, ("auto", "resident", "parallel"), SETTINGS)
-    made.prog, made.entry = "python -m taichi_dem demo", _ENTRY
-    study.add_pictures(made)
-    return study.main(run, made, arguments)
+    parser = study.parser(NAME, __doc__, ("auto", "resident", "parallel"), SETTINGS)
+    parser.prog, parser.entry = "python -m taichi_dem demo", _ENTRY
+    study.add_pictures(parser)
+    return study.main(run, parser, arguments)
 
 
 def run(options: Namespace) -> None:

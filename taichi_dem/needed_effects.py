@@ -48,15 +48,15 @@ def _differences(result, names, tolerance):
     if together <= tolerance or len(names) == 1:
         return dict.fromkeys(names, together)
     effects = result.scene.effects
-    found: dict[str, float] = {}
+    differences: dict[str, float] = {}
     left_out: list[str] = []
     rubs = {name for name, effect in zip(names_of(effects), effects) if effect.role == "friction"}
     # Friction first: contact can be left out only with it.
     for name in sorted(names, key=lambda name: name not in rubs):
-        found[name] = _difference(result, [*left_out, name])
-        if found[name] <= tolerance:
+        differences[name] = _difference(result, [*left_out, name])
+        if differences[name] <= tolerance:
             left_out.append(name)
-    return found
+    return differences
 
 
 def _difference(result, names):
@@ -100,7 +100,7 @@ def recorded_difference(first: Result, second: Result) -> float:
     rounding = {"_J": heat, "_m_s": speed, "_mm": 1e3 * speed * first.report.until_s}
     fastest = np.zeros(part.max() + 1)
     np.maximum.at(fastest, part, first.peak_speed)
-    found = [
+    differences = [
         _apart(first.peak_speed, second.peak_speed, speed, fastest[part]),
         _apart(np.nan_to_num(broken), np.nan_to_num(second.broken_time)),
     ]
@@ -111,15 +111,15 @@ def recorded_difference(first: Result, second: Result) -> float:
         if name != "residual_J" and not name.endswith("_N"):
             unexplained = next((rounding[unit] for unit in rounding if name.endswith(unit)), 0.0)
             scale = energy if name in joules else None
-            found.append(_apart(history[name], second.series.get(name), unexplained, scale))
-    return float(max(found, default=0.0))
+            differences.append(_apart(history[name], second.series.get(name), unexplained, scale))
+    return float(max(differences, default=0.0))
 
 
-def _apart(one, other, rounding=0.0, scale=None):
+def _apart(a, b, rounding=0.0, scale=None):
     """Largest difference of two arrays, over the largest value of the first or given scales."""
-    if other is None or np.shape(one) != np.shape(other):
+    if b is None or np.shape(a) != np.shape(b):
         return np.inf
-    largest = np.abs(one).max(initial=0.0) if scale is None else scale
-    apart = np.abs(np.asarray(one, dtype=np.float64) - other)
+    largest = np.abs(a).max(initial=0.0) if scale is None else scale
+    apart = np.abs(np.asarray(a, dtype=np.float64) - b)
     shares = np.where(apart <= rounding, 0.0, apart) / np.maximum(largest, 1e-300)
     return float(shares.max(initial=0.0))

@@ -327,8 +327,8 @@ class Receivers:
     def check_scene(self, scene: Scene) -> None:
         """Find the bodies that hold the points, and forget an earlier run."""
         places = self.points.items()
-        found = [body_at(scene.mesh, f"receiver {name}", np.array(at)) for name, at in places]
-        self._bodies, self._rows = np.array(found), []
+        bodies = [body_at(scene.mesh, f"receiver {name}", np.array(at)) for name, at in places]
+        self._bodies, self._rows = np.array(bodies), []
 
     def observe(self, view: RunView) -> None:
         """Keep displacements and velocities of the points."""
@@ -352,11 +352,11 @@ class Receivers:
 
 def write_receivers(path: FileName, receivers: Mapping[str, Received]) -> None:
     """Write a CSV row for each receiver and time; InputError when it cannot be written."""
-    names = [np.full(len(one.time_s), name) for name, one in receivers.items()]
-    times = [one.time_s for one in receivers.values()]
+    names = [np.full(len(receiver.time_s), name) for name, receiver in receivers.items()]
+    times = [receiver.time_s for receiver in receivers.values()]
     columns = {"receiver": np.concatenate(names), "time_s": np.concatenate(times)}
     for letter, unit, kind in (("u", "m", "displacement"), ("v", "m_s", "velocity")):
-        rows = np.vstack([getattr(one, kind) for one in receivers.values()])
+        rows = np.vstack([getattr(receiver, kind) for receiver in receivers.values()])
         columns.update({f"{letter}{axis}_{unit}": rows[:, k] for k, axis in enumerate("xyz")})
     write_csv(path, columns)
 
@@ -365,21 +365,23 @@ def checked_observers(observers: Any) -> Sequence[Any]:
     """Observers as a tuple; InputError for one without a member, or with a wrong one."""
     if not isinstance(observers, (list, tuple)):
         raise InputError(f"observers must be a list of observers, got {shown(observers)}")
-    for place, one in enumerate(observers):
-        timed = isinstance(getattr(one, "when", None), (Every, At))
-        if isinstance(one, type) or not (timed and callable(getattr(one, "observe", None))):
+    for place, observer in enumerate(observers):
+        timed = isinstance(getattr(observer, "when", None), (Every, At))
+        if isinstance(observer, type) or not (
+            timed and callable(getattr(observer, "observe", None))
+        ):
             raise InputError(
                 f"observers[{place}] must have a member when, an Every or an At, and a method "
-                f"observe(view), got {shown(one)}"
+                f"observe(view), got {shown(observer)}"
             )
     return observers
 
 
 def receivers_among(observers: Sequence[Any]) -> list[Receivers]:
     """Receivers among observers; InputError where two have one name."""
-    found = [one for one in observers if isinstance(one, Receivers)]
-    names = [name for one in found for name in one.points]
+    receivers = [observer for observer in observers if isinstance(observer, Receivers)]
+    names = [name for observer in receivers for name in observer.points]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise InputError(f"observers must have receivers of different names, got {twice[0]} twice")
-    return found
+    return receivers

@@ -121,7 +121,9 @@ class Result:
         from taichi_dem import plot
 
         drawn = {name.removeprefix("plot_"): getattr(plot, name) for name in plot.__all__}
-        return SimpleNamespace(**{name: MethodType(one, self) for name, one in drawn.items()})
+        return SimpleNamespace(
+            **{name: MethodType(function, self) for name, function in drawn.items()}
+        )
 
     def frame(self, number: int = -1) -> Frame:
         """Choose a frame.
@@ -193,9 +195,9 @@ class Result:
 
     def crack_area(self) -> Any:
         """Tabulate the area of all cracks [m^2] at the times of the history."""
-        made, times_s = arrays_of(self.cracks()), self.series["time_s"]
-        area = np.concatenate([[0.0], made["crack_area_m2"]])
-        upto = np.searchsorted(made["time_s"], times_s, side="right")
+        cracks, times_s = arrays_of(self.cracks()), self.series["time_s"]
+        area = np.concatenate([[0.0], cracks["crack_area_m2"]])
+        upto = np.searchsorted(cracks["time_s"], times_s, side="right")
         return data_frame({"time_s": times_s, "crack_area_m2": area[upto]})
 
     def rose(self, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36) -> Any:

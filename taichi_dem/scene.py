@@ -321,7 +321,7 @@ def _drags(scene, rough=False):
     """Whether contacts of each material, or of each with friction, have dashpots."""
     contact = scene.effect("contact")
     own = [row[k] for k, row in enumerate(scene.body_materials.pairs)]
-    return [contact.is_damped(one) for one in own if one.friction or not rough]
+    return [contact.is_damped(law) for law in own if law.friction or not rough]
 
 
 def remedy(contact: Any) -> str:
@@ -376,16 +376,16 @@ def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[tuple[np.ndarray,
         return np.zeros_like(centre), []
     if isinstance(given, Mapping) and given:
         return _by_group(name, given, mesh)
-    found = given(centre.copy()) if callable(given) else given
-    array = real_numbers(name, found)
-    one = array.shape == (3,) and not callable(given)
-    if not (one or array.shape == centre.shape):
+    rows = given(centre.copy()) if callable(given) else given
+    array = real_numbers(name, rows)
+    single = array.shape == (3,) and not callable(given)
+    if not (single or array.shape == centre.shape):
         raise InputError(
             f"{name} must be three numbers, for all bodies or by body group, or three for each of "
             f"{len(centre)} bodies, as an array or by a function of their centres, "
-            f"got {shown(found)}"
+            f"got {shown(rows)}"
         )
-    shared = [(np.arange(len(centre)), array)] if one else []
+    shared = [(np.arange(len(centre)), array)] if single else []
     return np.array(np.broadcast_to(array, centre.shape)), shared
 
 

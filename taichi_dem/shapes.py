@@ -121,10 +121,10 @@ def cylinder(*, radius: float, height: float, element: float, scatter: int | Non
     element = _element(element, min(radius, height), np.pi * radius**2 * height)
     sides = {"side": _on_circle((0.0, 0.0), 2.0 * radius, element)}
     outline = circle((0.0, 0.0), 2.0 * radius, element)
-    made = drawn_out([outline], height, element, sides, _seed(scatter))
-    made = made.moved(turned=(-90.0, 0.0, 0.0), about=(0.0, 0.0, 0.0))
+    solid = drawn_out([outline], height, element, sides, _seed(scatter))
+    solid = solid.moved(turned=(-90.0, 0.0, 0.0), about=(0.0, 0.0, 0.0))
     names = {"back": "bottom", "front": "top"}
-    return replace(made, groups={names.get(k, k): faces for k, faces in made.groups.items()})
+    return replace(solid, groups={names.get(k, k): faces for k, faces in solid.groups.items()})
 
 
 def plate(

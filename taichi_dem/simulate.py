@@ -204,12 +204,12 @@ class _Plan:
         progress_option("progress", progress)
         self.samples, self.frames = samples, frames
         self.observed = [
-            (one, one.when.marks(self.last, self.dt0, samples))
-            for one in checked_observers(observers)
+            (observer, observer.when.marks(self.last, self.dt0, samples))
+            for observer in checked_observers(observers)
         ]
-        for one in observers:
-            if hasattr(one, "check_scene"):
-                one.check_scene(scene)
+        for observer in observers:
+            if hasattr(observer, "check_scene"):
+                observer.check_scene(scene)
         self.receivers = receivers_among(observers)
 
     def calls(self, simulation: Simulation, recorder: Recorder, tell: Any) -> list[Call]:
@@ -227,15 +227,15 @@ class _Plan:
             share = min(1.0, time_s / (self.last * self.dt0))
             tell(Progress(share, seconds, "stepping", words))
 
-        made = [Call(sample, self._evenly(self.samples))]
+        calls = [Call(sample, self._evenly(self.samples))]
         if self.frames:
-            made.append(Call(lambda _: recorder.snapshot(), self._evenly(self.frames)))
-        for one, steps in self.observed:
-            wall_s = one.when.wall_s
-            made.append(Call(one.observe, steps, None if wall_s is None else Pace(wall_s)))
+            calls.append(Call(lambda _: recorder.snapshot(), self._evenly(self.frames)))
+        for observer, steps in self.observed:
+            wall_s = observer.when.wall_s
+            calls.append(Call(observer.observe, steps, None if wall_s is None else Pace(wall_s)))
         if tell is not None:
-            made.append(Call(progress, {self.last}, Pace(_REPORT_SECONDS)))
-        return made
+            calls.append(Call(progress, {self.last}, Pace(_REPORT_SECONDS)))
+        return calls
 
     def _evenly(self, count):
         return Every(samples=1).marks(self.last, self.dt0, count)
@@ -260,7 +260,7 @@ def _result(simulation, recorder, writer, plan, tell, start=None):
         if simulation.cut_short:
             raise
         error = raised
-    received = [one.received() for one in plan.receivers]
+    received = [receiver.received() for receiver in plan.receivers]
     result = Result(
         scene=simulation.scene,
         method=simulation.method,

@@ -115,16 +115,16 @@ class Cells:
     @ti.func
     def step_along(self, s, step, motion, width):
         """Take the lattice along by whole cells [m]; returns 1 for a step up, -1 down, else 0."""
-        stair, way = ti.cast(ti.floor(motion.x / width + 0.5), ti.i32), 0
+        stair, direction = ti.cast(ti.floor(motion.x / width + 0.5), ti.i32), 0
         if step == 0:
             self.stair[s] = stair
         elif stair > self.stair[s]:
-            way = 1
+            direction = 1
         elif stair < self.stair[s]:
-            way = -1
-        self.stair[s] = self.stair[s] + way
+            direction = -1
+        self.stair[s] = self.stair[s] + direction
         self.offset[s] = motion.x - width * self.stair[s]
-        return way
+        return direction
 
 
 class OnCells:
@@ -145,9 +145,9 @@ def _named_cells(options):
 class Placement(OnCells):
     """First cells of the particles: named by the user, or drawn from the scene's seed."""
 
-    def __init__(self, cells: Cells, way: int, is_named: bool):
+    def __init__(self, cells: Cells, direction: int, is_named: bool):
         super().__init__(cells)
-        self.way, self.is_named = way, is_named
+        self.way, self.is_named = direction, is_named
         if is_named:
             self.named = self.table.field(ti.i32, "cells")
 

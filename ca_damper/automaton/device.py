@@ -62,10 +62,10 @@ class LatticeDevice:
         self.event_counts = EventCounts(table, len(_BY), _BY)
         self.velocity, self.gained = table.field(ti.f64), table.field(ti.i64)
 
-    def fill(self, automaton: Any, cells: Cells, resting: Any, way: int) -> None:
+    def fill(self, automaton: Any, cells: Cells, resting: Any, direction: int) -> None:
         """Add cells, what rests in them, and how they are filled."""
         self.cells, self.resting = cells, resting
-        self.placement = Placement(cells, way, automaton.start is not None)
+        self.placement = Placement(cells, direction, automaton.start is not None)
 
     def upload(self, fillings: Fillings) -> None:
         """Take over the numbers of the automaton of each scene."""
@@ -121,9 +121,11 @@ class LatticeDevice:
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """How often each of the named effects acted; without their energy, all of them steer."""
-        found = [(name, *_COUNTED[name]) for name in effects if name in _COUNTED]
+        counted = [(name, *_COUNTED[name]) for name in effects if name in _COUNTED]
         total = self.event_counts.total
-        return tuple(EffectUse(name, what, total(kind), steers=True) for name, kind, what in found)
+        return tuple(
+            EffectUse(name, what, total(kind), steers=True) for name, kind, what in counted
+        )
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""

@@ -123,11 +123,11 @@ class Lattice:
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()
         assign(self.cosine, cosines)
-        fillings.write(self.size, lambda one: geometry_of(one).sizes)
-        fillings.write(self.level, lambda one: geometry_of(one).levels())
-        fillings.write(self.bottom, lambda one: geometry_of(one).bottoms())
+        fillings.write(self.size, lambda filling: geometry_of(filling).sizes)
+        fillings.write(self.level, lambda filling: geometry_of(filling).levels())
+        fillings.write(self.bottom, lambda filling: geometry_of(filling).bottoms())
         if self.looks_ahead:
-            fillings.write(self.neighbour, lambda one: geometry_of(one).neighbours())
+            fillings.write(self.neighbour, lambda filling: geometry_of(filling).neighbours())
 
     def geometry(self, s: int) -> LatticeGeometry:
         """The geometry of a scene."""
@@ -162,9 +162,9 @@ class Lattice:
         return (column + 1) * self.size.height[s] + row + 1
 
     @ti.func
-    def cell_from(self, s, column, k, way):
+    def cell_from(self, s, column, k, direction):
         """The k-th cell of a column, counted upwards (way 1) or downwards (-1)."""
-        return self.cell_of(s, column, k if way > 0 else self.size.rows[s] - 1 - k)
+        return self.cell_of(s, column, k if direction > 0 else self.size.rows[s] - 1 - k)
 
     @ti.func
     def height_of(self, s, cell):
@@ -182,9 +182,9 @@ class Lattice:
         return ti.cast(self.bottom[s, cell], ti.i32) // self.size.height[s] - 1
 
     @ti.func
-    def column_beside(self, s, cell, way):
+    def column_beside(self, s, cell, direction):
         """Lowest cell of the column to the right (way 1) or left (-1) of a cell, a wall."""
-        return ti.cast(self.bottom[s, cell], ti.i32) + way * self.size.height[s]
+        return ti.cast(self.bottom[s, cell], ti.i32) + direction * self.size.height[s]
 
     @ti.func
     def in_side_wall(self, s, cell):

@@ -137,8 +137,8 @@ class Coupling:
 
     @ti.func
     def _advance_scene(self, s, share):
-        begin, way = self.begin[s], self.goal[s] - self.begin[s]
-        target = begin + ti.cast(ti.floor(share * way), ti.i32)
+        begin, span = self.begin[s], self.goal[s] - self.begin[s]
+        target = begin + ti.cast(ti.floor(share * span), ti.i32)
         while self.step[s] < target and self._is_sound(s):
             self._advance_step(s)
         if ti.static(backend.most_rounds() > 0):

@@ -76,7 +76,9 @@ class DamperEngine(Engine):
         """Take over the numbers of a batch; the state follows with ``coupling.start``."""
         self.table.upload(table)
         fillings.write(self.table.gravity, gravity_along)
-        fillings.write(self.table.weight, lambda one: one.particle_mass * gravity_along(one))
+        fillings.write(
+            self.table.weight, lambda filling: filling.particle_mass * gravity_along(filling)
+        )
         self.container.upload(mount, mount.numbers(table), rtol, atol)
         self.excitation.upload(excitation)
         self.device.upload(fillings)

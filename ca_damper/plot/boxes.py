@@ -177,8 +177,8 @@ def animate_films(
         bar = {"location": "bottom", "aspect": 40, "pad": 0.02}
         figure.colorbar(drawn[0].particles, ax=panels.tolist(), label=_SPEED, **bar)
         for shots in zip(*(frames for _, frames in films.values())):
-            for one, frame in zip(drawn, shots):
-                one.show(frame)
+            for drawing, frame in zip(drawn, shots):
+                drawing.show(frame)
             shoot()
 
 
@@ -197,46 +197,48 @@ def film_hanging(path: FileName, containers: Sequence[Hanging], fastest: float) 
     """Write a GIF of containers side by side, with their displacement over time."""
     first = containers[0].frames
     # A container that diverged has frames without numbers.
-    swing = 1.1 * np.nanmax([abs(frame.x) for one in containers for frame in one.frames])
-    step = 1.35 * max(one.box.width for one in containers)
+    swing = 1.1 * np.nanmax([abs(frame.x) for hanging in containers for frame in hanging.frames])
+    step = 1.35 * max(hanging.box.width for hanging in containers)
     with _moving_picture(path, (4.0, 3.0)) as (figure, shoot):
         bench, curve = figure.subplots(1, 2, width_ratios=[1.25, 1.0])
-        hung = [_Hung(bench, one, fastest, k * step, swing) for k, one in enumerate(containers)]
+        hung = [
+            _Hung(bench, hanging, fastest, k * step, swing) for k, hanging in enumerate(containers)
+        ]
         bench.margins(0.02)
         bench.set_aspect("equal")
         bench.set_axis_off()
         bar = {"location": "bottom", "aspect": 30, "pad": 0.02}
         figure.colorbar(hung[0].drawn.particles, ax=bench, label=_SPEED, **bar)
-        dots = [_curve(curve, one, first[0].time_s) for one in containers]
+        dots = [_curve(curve, hanging, first[0].time_s) for hanging in containers]
         curve.set(ylim=(-1e3 * swing, 1e3 * swing), xlabel="time [s]", ylabel="displacement [mm]")
         # Under the dots, which move: what lies over them is drawn again for each frame.
         curve.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0)).set_zorder(1)
-        for shots in zip(*(one.frames for one in containers)):
-            for one, dot, frame in zip(hung, dots, shots):
-                one.show(frame)
+        for shots in zip(*(hanging.frames for hanging in containers)):
+            for hanging, dot, frame in zip(hung, dots, shots):
+                hanging.show(frame)
                 dot.set_data([frame.time_s - first[0].time_s], [1e3 * frame.x])
             shoot()
 
 
-def _curve(axes, one, begin):
+def _curve(axes, hanging, begin):
     """Draw the displacement of a container; returns the dot for the present."""
-    frames = zip(*((frame.time_s, frame.x) for frame in one.frames))
-    time, moved = map(np.array, frames if one.curve is None else one.curve)
-    axes.plot(time - begin, 1e3 * moved, color=one.colour, linewidth=0.9, label=one.title)
-    return axes.plot([], [], "o", color=one.colour, markersize=4)[0]
+    frames = zip(*((frame.time_s, frame.x) for frame in hanging.frames))
+    time, moved = map(np.array, frames if hanging.curve is None else hanging.curve)
+    axes.plot(time - begin, 1e3 * moved, color=hanging.colour, linewidth=0.9, label=hanging.title)
+    return axes.plot([], [], "o", color=hanging.colour, markersize=4)[0]
 
 
 class _Hung:
     """A box on a spring that hangs from the base."""
 
-    def __init__(self, axes, one, fastest, offset, swing):
-        self.drawn = DrawnBox(axes, one.box, fastest, offset)
-        width, self.top = 1e3 * one.box.width, 1e3 * one.box.height
+    def __init__(self, axes, hanging, fastest, offset, swing):
+        self.drawn = DrawnBox(axes, hanging.box, fastest, offset)
+        width, self.top = 1e3 * hanging.box.width, 1e3 * hanging.box.height
         left, below = 1e3 * offset, -1e3 * swing
         self.middle = left + 0.5 * width
         (self.spring,) = axes.plot([], [], color=BLACK, linewidth=0.9)
         (self.base,) = axes.plot([], [], color=BLACK, linewidth=3.0)
-        axes.text(self.middle, below - 12.0, one.title, ha="center")
+        axes.text(self.middle, below - 12.0, hanging.title, ha="center")
         axes.update_datalim([(left, below - 14.0), (left + width, self.top + _HANGS)])
 
     def show(self, frame):

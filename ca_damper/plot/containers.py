@@ -46,7 +46,7 @@ def show_containers(
     notes: Sequence[str] = (),
 ) -> WebPage:
     """Write a page that plays containers side by side, with their displacement over time."""
-    rows = list(zip(*(one.frames for one in containers)))
+    rows = list(zip(*(container.frames for container in containers)))
     size = 6 * sum(len(frame.position) for frame in rows[0]) + 24 * len(containers)
     frames, left_out = select_frames(rows, [_is_finite(row) for row in rows], size, 10_000)
     factor, unit = scale(frames[-1][0].time_s, "s")
@@ -55,14 +55,16 @@ def show_containers(
         "unit": unit,
         "times": [factor * row[0].time_s for row in frames],
         "mount": mount,
-        "containers": [_drawn(one, shots) for one, shots in zip(containers, zip(*frames))],
+        "containers": [
+            _drawn(container, shots) for container, shots in zip(containers, zip(*frames))
+        ],
         "curves": [
             {
-                **{"name": one.title, "colour": one.colour},
+                **{"name": container.title, "colour": container.colour},
                 "times": [factor * frame.time_s for frame in shots],
                 "values": [1e3 * frame.x for frame in shots],
             }
-            for one, shots in zip(containers, zip(*frames))
+            for container, shots in zip(containers, zip(*frames))
         ],
         "curveLabel": "displacement [mm]",
         "speed": {
@@ -70,7 +72,7 @@ def show_containers(
             "table": pack(table_of(SPEEDS(np.linspace(0.0, 1.0, 256))), "uint8"),
         },
     }
-    words = [", ".join(one.title for one in containers), counted(len(frames), "frame")]
+    words = [", ".join(container.title for container in containers), counted(len(frames), "frame")]
     content = {"title": "Granular damper", "subtitle": "; ".join(words)}
     notes = [*notes, *left_out]
     return show_page(path, open_browser, [_SCRIPT], data=data, notes=notes, **content)
@@ -87,12 +89,12 @@ def _fastest(frames: Sequence[Sequence[SceneFrame]]) -> float:
     return float(np.percentile(np.concatenate([*speeds, [1e-9]]), 99)) or 1.0
 
 
-def _drawn(one: Hanging, frames: Sequence[SceneFrame]) -> dict[str, Any]:
+def _drawn(container: Hanging, frames: Sequence[SceneFrame]) -> dict[str, Any]:
     """What is drawn of a container, in mm; frames: those that the page holds."""
-    first, box = frames[0], one.box
+    first, box = frames[0], container.box
     diameters = np.full(len(first.position), box.diameter)
     return {
-        **{"title": one.title, "colour": one.colour},
+        **{"title": container.title, "colour": container.colour},
         **{"width": 1e3 * box.width, "height": 1e3 * float(np.ptp(box.outline()[:, 1]))},
         "outline": (1e3 * box.outline()).tolist(),
         "lift": [float(1e3 * box.lift(frame.x)) for frame in frames],

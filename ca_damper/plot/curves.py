@@ -131,9 +131,9 @@ def _draw_ways(axis, sweep, k):
         (sweep.down, "frequency falling", _SHADES(0.75), "<"),
     )
     for seed in range(len(sweep.up.seeds)):
-        for way, words, colour, mark in ways:
+        for values, words, colour, mark in ways:
             look = {"color": colour, "marker": mark, "ms": 3, "label": words if seed == 0 else None}
-            axis.plot(sweep.up.ratios, 1e3 * way.rms[k, :, seed], **look)
+            axis.plot(sweep.up.ratios, 1e3 * values.rms[k, :, seed], **look)
 
 
 class ResponsePlots:
@@ -232,8 +232,8 @@ def picture_cycle(path: FileName, measures: Any, amplitude: float) -> None:
             motion = amplitude * np.sin(2.0 * np.pi * time)
             top.plot(time, motion, color=GREY, linestyle=":", label="container")
             top.set_title(title)
-            for label, one in fillings.items():
-                _draw_cycle(top, bottom, one, styles[label])
+            for label, cycle in fillings.items():
+                _draw_cycle(top, bottom, cycle, styles[label])
             bottom.set(xlabel="phase of the container [cycles]", xlim=(0.0, 1.0), ylim=(0.0, None))
         panels[0, 0].set_ylabel("mean height in the room\nless that at rest [mm]")
         panels[1, 0].set_ylabel("particles that touch [%]")
@@ -245,11 +245,11 @@ def picture_cycle(path: FileName, measures: Any, amplitude: float) -> None:
         figure.legend(handles=keys, loc="outside upper left", ncols=2)
 
 
-def _draw_cycle(top, bottom, one, style):
+def _draw_cycle(top, bottom, cycle, style):
     """Curves of a filling: means over the cycles, and the spread of the height between them."""
     # The cycle is closed: it ends as it begins.
-    phase, ends = np.append(one.phase, 1.0), {"-": one.floor, "--": one.ceiling}
-    height, spread = (_closed(over(one.height_mm, axis=0)) for over in (np.mean, np.std))
+    phase, ends = np.append(cycle.phase, 1.0), {"-": cycle.floor, "--": cycle.ceiling}
+    height, spread = (_closed(over(cycle.height_mm, axis=0)) for over in (np.mean, np.std))
     look = {"color": style.colour, "marker": style.marker, "ms": 4}
     top.plot(phase, height, label=style.label, **look)
     band = {"color": style.colour, "alpha": 0.18, "linewidth": 0}

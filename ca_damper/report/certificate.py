@@ -43,8 +43,8 @@ class Periods:
     def __str__(self) -> str:
         test = f"first harmonic of {self.cycles} cycles within {100.0 * self.tolerance:.2g} %"
         every = {p: "every cycle" if p == 1 else f"every {p} cycles" for p, _ in self.scenes}
-        found = [f"{counted(n, 'scene')} {every[p]}" for p, n in self.scenes]
-        return f"{', '.join(found) or 'no scene'}, {counted(self.others, 'scene')} never ({test})"
+        words = [f"{counted(n, 'scene')} {every[p]}" for p, n in self.scenes]
+        return f"{', '.join(words) or 'no scene'}, {counted(self.others, 'scene')} never ({test})"
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ class CheckedRange:
     @property
     def finding(self) -> str:
         """What of the scenes lies outside, in words."""
-        found = f"outside: {'; '.join(self.outside)}" if self.outside else "inside"
+        finding = f"outside: {'; '.join(self.outside)}" if self.outside else "inside"
         open_part = "" if self.knows_motion else ", except the motion, which was not checked"
-        return f"{found}{open_part}"
+        return f"{finding}{open_part}"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -105,11 +105,11 @@ class Certificate(BaseCertificate):
 
     def left_out_lines(self) -> list[str]:
         """What was left out, and what is periodic, in lines."""
-        skipping = (one for one in self.acting if one.skipped)
+        skipping = (use for use in self.acting if use.skipped)
         return [
             *(f"estimated: {estimate}" for estimate in self.estimates),
             *super().left_out_lines(),
-            *(f"{one.effect}: {one.skipped:,} tests skipped" for one in skipping),
+            *(f"{use.effect}: {use.skipped:,} tests skipped" for use in skipping),
             *([] if self.periods is None else [f"periodic: {self.periods}"]),
         ]
 
@@ -118,7 +118,7 @@ class Certificate(BaseCertificate):
         return {
             "effects": self.effects,
             **super().as_dict(),
-            "estimates": [one.as_dict() for one in self.estimates],
+            "estimates": [estimate.as_dict() for estimate in self.estimates],
             "periods": self.periods and asdict(self.periods),
         }
 
@@ -148,13 +148,13 @@ def checked_range(batch: Any) -> CheckedRange | None:
         size = np.full(batch.count, np.nan)
     mass = batch.support.masses(batch.table)
     driven = particles, mass, size, size * (2.0 * np.pi * frequency) ** 2
-    found: list[CheckedRange] = [
+    ranges: list[CheckedRange] = [
         kind.checked_range(Driven(*(of_all[which == k] for of_all in driven)))
         for k, kind in enumerate(kinds)
     ]
-    outside = tuple(dict.fromkeys(words for one in found for words in one.outside))
-    warning = "; ".join(dict.fromkeys(one.warning for one in found if one.warning))
-    return CheckedRange(found[0].words, outside, warning, bool((size > 0.0).all()))
+    outside = tuple(dict.fromkeys(words for checked in ranges for words in checked.outside))
+    warning = "; ".join(dict.fromkeys(checked.warning for checked in ranges if checked.warning))
+    return CheckedRange(ranges[0].words, outside, warning, bool((size > 0.0).all()))
 
 
 def certificate_of(batch: Any, momentum_error: float) -> Certificate:
@@ -172,7 +172,7 @@ def certificate_of(batch: Any, momentum_error: float) -> Certificate:
         estimates=batch.estimates,
         periods=batch.periods,
         checked=checked,
-        warnings=(*(f"outside of the checked range, {one}" for one in outside), *gone),
+        warnings=(*(f"outside of the checked range, {words}" for words in outside), *gone),
     )
 
 
@@ -194,7 +194,7 @@ def periods_of(cycles: Cycles) -> Periods | None:
     if measured < 2:
         return None
     series = cycles.harmonic_by_cycle("x")
-    found = [period(one, ALIKE) for one in series if np.isfinite(one).all()]
-    lengths, counts = np.unique([one for one in found if one], return_counts=True)
+    periods = [period(values, ALIKE) for values in series if np.isfinite(values).all()]
+    lengths, counts = np.unique([values for values in periods if values], return_counts=True)
     pairs = tuple(zip(map(int, lengths), map(int, counts)))
-    return Periods(measured, ALIKE, pairs, len(found) - int(counts.sum()))
+    return Periods(measured, ALIKE, pairs, len(periods) - int(counts.sum()))

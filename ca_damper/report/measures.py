@@ -276,8 +276,8 @@ def _misses(x, low, k):
     left = (low[k] - low[k - 1]) / (x1 - x0)
     bend = ((low[k + 1] - low[k]) / (x2 - x1) - left) / (x2 - x0)
     beyond = [j for j in (k - 2, k + 2) if 0 <= j < len(x) and np.isfinite(low[j])]
-    found = [(low[k - 1] + (x[j] - x0) * (left + bend * (x[j] - x1))) / low[j] for j in beyond]
-    return any(not 1.0 / _OFF < share < _OFF for share in found)
+    misses = [(low[k - 1] + (x[j] - x0) * (left + bend * (x[j] - x1))) / low[j] for j in beyond]
+    return any(not 1.0 / _OFF < share < _OFF for share in misses)
 
 
 def vertex(x: ArrayLike, y: ArrayLike) -> tuple[float, float]:

@@ -83,7 +83,7 @@ class PeakSearch:
             level = min(math.ceil(math.log2(widest / wanted)), self.level + 3)
             self.level = max(self.level, level)
             around = self.lattice.around(ratio, self.level)
-            missing = [one for one in around if one not in self.found]
+            missing = [missed for missed in around if missed not in self.found]
             if not missing:
                 return ratio, self.lattice, self.level
             self._measure(missing)

@@ -39,8 +39,8 @@ class SceneFrame:
 
 def frames_of(batch: Any, present: dict[str, np.ndarray] | None = None) -> tuple[SceneFrame, ...]:
     """A Frame of every scene of a batch as it is now."""
-    found = batch.sample() if present is None else present
-    time_s, x, y = (found[name].tolist() for name in ("time_s", "x", "y"))
+    sample = batch.sample() if present is None else present
+    time_s, x, y = (sample[name].tolist() for name in ("time_s", "x", "y"))
     shots = [batch.snapshot(s) for s in range(batch.count)]
     return tuple(
         SceneFrame(time_s[s], x[s], y[s], shot["position"], shot["velocity"], shot.get("diameter"))

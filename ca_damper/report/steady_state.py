@@ -120,8 +120,8 @@ def correlation(series: np.ndarray) -> float:
     total, rounding = float(apart @ apart), ROUNDING * abs(float(series.mean()))
     if total <= rounding * rounding * len(series):
         return 0.0
-    found = float(apart[1:] @ apart[:-1]) / total
-    return min(_MOST_CORRELATED, max(0.0, found + (1.0 + 3.0 * found) / len(series)))
+    value = float(apart[1:] @ apart[:-1]) / total
+    return min(_MOST_CORRELATED, max(0.0, value + (1.0 + 3.0 * value) / len(series)))
 
 
 def _least_error(x):
@@ -231,7 +231,7 @@ def _approach(x, allowed):
     count, size = len(x), abs(float(x[len(x) // 2 :].mean()))
     limit, error, time = _limit(x[count // 2 :])
     windows = [max(LEAST_CYCLES, count // share) for share in _WINDOWS]
-    drifts = [float(abs(x[count - one :].mean() - limit) + 2.0 * error) for one in windows]
+    drifts = [float(abs(x[count - tail :].mean() - limit) + 2.0 * error) for tail in windows]
     for window, drift in zip(windows, drifts):
         if drift <= allowed * size:
             return _part(x, count - window, drift, 0, True)

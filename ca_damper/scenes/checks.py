@@ -82,16 +82,16 @@ def check_within(excitation: Excitation, ends: np.ndarray) -> None:
 
 def sampling_found(excitation: Excitation, frequencies: np.ndarray) -> tuple[str, ...]:
     """Sentences about samples that are too few for the frequencies of a structure."""
-    found = []
-    for role, one in excitation.signals.items():
-        few = np.unique(frequencies[frequencies * one.apart * _ENOUGH > 1.0 + 1e-9])
+    sentences = []
+    for role, signal in excitation.signals.items():
+        few = np.unique(frequencies[frequencies * signal.apart * _ENOUGH > 1.0 + 1e-9])
         if len(few):
-            found.append(
+            sentences.append(
                 f"{role} has fewer than {_ENOUGH} samples a period above "
-                f"{1.0 / (_ENOUGH * one.apart):.4g} Hz, as the structure has at "
+                f"{1.0 / (_ENOUGH * signal.apart):.4g} Hz, as the structure has at "
                 f"{listed(few.tolist())} Hz: its motion there may be off by more than 0.1 %"
             )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def run_seeds(seeds: Any) -> tuple[int, ...]:

@@ -95,7 +95,7 @@ class SceneMemory:
     def read(self) -> dict[str, np.ndarray]:
         """Copies of all that changes in a run, by name."""
         ti.sync()
-        scenes = {f"scenes/{k}": self._cut(one) for k, one in enumerate(self.engine.table.made)}
+        scenes = {f"scenes/{k}": self._cut(entry) for k, entry in enumerate(self.engine.table.made)}
         return {**scenes, **{name: values(field) for name, field in self._others.items()}}
 
     def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
@@ -108,28 +108,32 @@ class SceneMemory:
 
     def write(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Restore the fields from arrays that ``read`` returned and ``misfit`` accepts."""
-        for k, one in enumerate(self.engine.table.made):
-            whole = values(one.field)
-            self._window(one, whole)[...] = arrays[f"scenes/{k}"]
-            assign(one.field, whole)
+        for k, entry in enumerate(self.engine.table.made):
+            whole = values(entry.field)
+            self._window(entry, whole)[...] = arrays[f"scenes/{k}"]
+            assign(entry.field, whole)
         for name, field in self._others.items():
             assign(field, arrays[name])
 
     @functools.cached_property
     def _others(self) -> dict[str, ti.Field]:
         """Fields that are not of the scenes: those of fillings that declare them by themselves."""
-        scenes = {id(one.field) for one in self.engine.table.made}
-        found = [one for one in fields_of(self.engine) if one.kind == "saved"]
-        return {f"others/{one.name}": one.field for one in found if id(one.field) not in scenes}
+        scenes = {id(entry.field) for entry in self.engine.table.made}
+        entries = [entry for entry in fields_of(self.engine) if entry.kind == "saved"]
+        return {
+            f"others/{entry.name}": entry.field
+            for entry in entries
+            if id(entry.field) not in scenes
+        }
 
-    def _cut(self, one: SceneField) -> np.ndarray:
-        return self._window(one, lying(one.field)).copy()
+    def _cut(self, field: SceneField) -> np.ndarray:
+        return self._window(field, lying(field.field)).copy()
 
-    def _window(self, one: SceneField, whole: np.ndarray) -> np.ndarray:
+    def _window(self, field: SceneField, whole: np.ndarray) -> np.ndarray:
         """Part of an array of a field that the batch uses."""
         table = self.engine.table
-        if one.flat:
+        if field.flat:
             entry = whole.shape[1:]
-            whole = whole.reshape(table.capacity, table.length(one.lengths[0]), *entry)
-        used = [self.sizes.get(n, n) if isinstance(n, str) else n for n in one.lengths]
+            whole = whole.reshape(table.capacity, table.length(field.lengths[0]), *entry)
+        used = [self.sizes.get(n, n) if isinstance(n, str) else n for n in field.lengths]
         return whole[tuple(slice(n) for n in (table.scene_count, *used))]

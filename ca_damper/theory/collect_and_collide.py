@@ -82,10 +82,10 @@ def collect_and_collide(amplitude: ArrayLike, gap: ArrayLike) -> CollectAndColli
     >>> round(float(made.energy), 12)
     4.0
     """
-    size, way = np.broadcast_arrays(
+    size, clearance = np.broadcast_arrays(
         real_numbers("amplitude", amplitude, SMALLEST), real_numbers("gap", gap, SMALLEST)
     )
-    ratio = way / size
+    ratio = clearance / size
     phase = _phase(np.minimum(ratio, np.pi))
     phase = np.where(ratio <= np.pi, phase, np.nan)
     loss = (1.0 - np.cos(phase)) ** 2 / np.pi

@@ -194,8 +194,8 @@ class ImpactDamper:
 
     def multipliers(self, u: float) -> np.ndarray:
         """Complex factors by which small changes grow between impacts, the largest first."""
-        found = np.linalg.eigvals(self._jacobian(u))
-        return found[np.argsort(-np.abs(found), kind="stable")]
+        multipliers = np.linalg.eigvals(self._jacobian(u))
+        return multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
 
     def is_stable(self, u: float) -> bool:
         """Whether small changes of the motion die away: all ``multipliers`` in the unit circle.

@@ -92,7 +92,7 @@ class MeshStiffness:
         """A line for each axis, the means, and the wave speeds."""
         means = self.young, self.poisson, self.shear, self.bulk + 4.0 / 3.0 * self.shear
         columns = self.young_along, self.poisson_along, self.shear_across, np.diag(self.stiffness)
-        rows = {f"along {name}": [one[k] for one in columns] for k, name in enumerate("xyz")}
+        rows = {f"along {name}": [column[k] for column in columns] for k, name in enumerate("xyz")}
         cells = [["block of the mesh", "E GPa", "nu", "G GPa", "uniaxial strain GPa"]]
         for name, (young, poisson, *moduli) in {**rows, "all directions": means}.items():
             own = f"{young * 1e-9:.4g}", f"{poisson:.3f}"
@@ -187,16 +187,16 @@ def motions_under(
     inverse = np.linalg.inv(np.where(alone[:, None, None], np.eye(6), own))
     # Of the largest load: another may be zero but for rounding, as a pull along a face is.
     bound = _TOLERANCE**2 * _products(rest, inverse @ rest).max()
-    way, size = np.zeros(forces.shape), np.ones(forces.shape[2])
+    direction, size = np.zeros(forces.shape), np.ones(forces.shape[2])
     for _ in range(_MOST_ITERATIONS):
         scaled = inverse @ rest
         now = _products(rest, scaled)
         if np.all(now <= bound):
             return solved
-        way = scaled + now / np.maximum(size, _TINY) * way
-        held = own @ way + rows @ way[neighbour].reshape(len(way), 24, -1)
-        size, step = now, now / np.maximum(_products(way, held), _TINY)
-        solved += step * way
+        direction = scaled + now / np.maximum(size, _TINY) * direction
+        held = own @ direction + rows @ direction[neighbour].reshape(len(direction), 24, -1)
+        size, step = now, now / np.maximum(_products(direction, held), _TINY)
+        solved += step * direction
         rest -= step * held
     raise InputError(
         f"the springs of a mesh must be solved within {_MOST_ITERATIONS} iterations, and are "
@@ -225,6 +225,6 @@ def _blocks(mesh, topology, springs):
     return own, np.moveaxis(across, 1, 2).reshape(count, 6, 24), neighbour
 
 
-def _products(one, other):
+def _products(first, second):
     """Inner products of two fields, one for each load."""
-    return np.einsum("bkl,bkl->l", one, other)
+    return np.einsum("bkl,bkl->l", first, second)

@@ -141,12 +141,12 @@ def point_blocks(arms: np.ndarray, law: np.ndarray, multiply: Any = product) -> 
 
 def levers(arms: np.ndarray) -> np.ndarray:
     """Maps J from (velocity, spin) to the velocity of points at arms (..., 3), (..., 3, 6)."""
-    made = np.zeros((*arms.shape, 6))
-    made[..., :3] = np.eye(3)
+    matrices = np.zeros((*arms.shape, 6))
+    matrices[..., :3] = np.eye(3)
     x, y, z = np.moveaxis(arms, -1, 0)
     for row, column, part in ((0, 1, z), (1, 2, x), (2, 0, y)):
-        made[..., row, 3 + column], made[..., column, 3 + row] = part, -part
-    return made
+        matrices[..., row, 3 + column], matrices[..., column, 3 + row] = part, -part
+    return matrices
 
 
 def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray, multiply: Any = product) -> np.ndarray:
@@ -186,9 +186,9 @@ def wave_moduli(model: Any, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return _modulus(mean, normal, normal), 0.5 * shear
 
 
-def _modulus(stiffness, normal, way):
+def _modulus(stiffness, normal, direction):
     """Twice the energy per volume [Pa] of the strain (n w + w n) / 2."""
-    outer = normal[:, :, None] * way[:, None, :]
+    outer = normal[:, :, None] * direction[:, None, :]
     strain = np.stack([0.5 * (outer + transposed(outer))[:, a, b] for a, b in PAIRS], axis=1)
     strain[:, 3:] *= 2.0
     return dot(strain, product(stiffness, strain[:, :, None])[:, :, 0])
@@ -246,9 +246,9 @@ def _given_way(maps, laws, links, opening, bodies):
         pulled = product(transposed(lever), laws)
         np.add.at(force, side, product(pulled, opening).sum(axis=1))
         np.add.at(block, side, product(pulled, lever).sum(axis=1))
-    way = np.zeros((count, 6, 6))
-    way[bodies] = -_STEP * product(inverse(block[bodies]), force[bodies])
-    return sum(product(lever, way[side][:, None]) for lever, side in zip(maps, links))
+    directions = np.zeros((count, 6, 6))
+    directions[bodies] = -_STEP * product(inverse(block[bodies]), force[bodies])
+    return sum(product(lever, directions[side][:, None]) for lever, side in zip(maps, links))
 
 
 def _bodies_at(tetrahedra, corners, point_count):

@@ -161,14 +161,14 @@ def assign(field: ti.Field, array: ArrayLike) -> None:
 
 def available_bytes() -> float:
     """Memory available to a new allocation; infinite where the system does not report it."""
-    found = [_free_memory()]
+    limits = [_free_memory()]
     with contextlib.suppress(OSError, ValueError):
         with (
             open("/sys/fs/cgroup/memory.max") as most,
             open("/sys/fs/cgroup/memory.current") as now,
         ):
-            found.append(float(most.read()) - float(now.read()))
-    return min(found)
+            limits.append(float(most.read()) - float(now.read()))
+    return min(limits)
 
 
 def _free_memory() -> float:

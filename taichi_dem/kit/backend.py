@@ -101,20 +101,20 @@ def cut_short(whose: str, advice: str) -> InputError:
 def loops_have_ended(rounds):
     """Whether the driver ends the loops of this thread; rounds: a number of at least 1."""
     # The loops make one round; no compiler can know that these statements do not make six.
-    x, made = ti.min(rounds, 1), 0
+    x, count = ti.min(rounds, 1), 0
     while x < 1000:
         x = 3 * x + 1
-        made += 1
-    return made < 6
+        count += 1
+    return count < 6
 
 
 def _loops_end_alone(block):
     """Whether each thread of a block makes the rounds of its own loop, beside an atomic."""
     total = ti.ndarray(ti.i32, shape=1)
-    made = ti.ndarray(ti.f64, shape=_THREADS)
+    counts = ti.ndarray(ti.f64, shape=_THREADS)
 
     @ti.kernel
-    def loop(total: _I32, made: _F64):
+    def loop(total: _I32, counts: _F64):
         if ti.static(block):
             ti.loop_config(block_dim=block)
         for i in range(_THREADS):
@@ -122,25 +122,25 @@ def _loops_end_alone(block):
             for _ in range(i % 11):
                 ti.atomic_add(total[0], 1)
                 rounds += 1.0
-            made[i] = rounds
+            counts[i] = rounds
 
-    loop(total, made)
-    return bool((made.to_numpy() == np.arange(_THREADS) % 11).all())
+    loop(total, counts)
+    return bool((counts.to_numpy() == np.arange(_THREADS) % 11).all())
 
 
 def _rounds():
     """Rounds after which loops end; 0 where they make all that they should."""
-    made = ti.ndarray(ti.i32, shape=1)
+    counts = ti.ndarray(ti.i32, shape=1)
 
     @ti.kernel
-    def loop(made: _I32, rounds: ti.i32):
+    def loop(counts: _I32, rounds: ti.i32):
         for i in range(1):
             for _ in range(rounds):
-                made[i] = made[i] + 1
+                counts[i] = counts[i] + 1
 
-    loop(made, _ROUNDS)
-    found = int(made.to_numpy()[0])
-    return found if found < _ROUNDS else 0
+    loop(counts, _ROUNDS)
+    rounds_made = int(counts.to_numpy()[0])
+    return rounds_made if rounds_made < _ROUNDS else 0
 
 
 def declared_bytes(node: Any) -> int:

@@ -127,11 +127,11 @@ class StopRequests:
 
 def digest(*arrays: ArrayLike) -> str:
     """Twelve letters that change with any bit, type or shape of the arrays."""
-    made = hashlib.sha256()
+    hashed = hashlib.sha256()
     for array in map(np.ascontiguousarray, arrays):
-        made.update(f"{array.dtype} {array.shape}".encode())
-        made.update(array.tobytes())
-    return made.hexdigest()[:12]
+        hashed.update(f"{array.dtype} {array.shape}".encode())
+        hashed.update(array.tobytes())
+    return hashed.hexdigest()[:12]
 
 
 def identity_of(value: Any) -> str:

@@ -39,9 +39,9 @@ def data_frame(columns: Mapping[str, ArrayLike], **attributes: Any) -> Any:
     """A pandas.DataFrame of columns of one length; ``attrs["units"]`` has the unit of each."""
     import pandas
 
-    made = pandas.DataFrame(dict(columns))
-    made.attrs = {"units": {name: unit_of(name) for name in columns}, **attributes}
-    return made
+    frame = pandas.DataFrame(dict(columns))
+    frame.attrs = {"units": {name: unit_of(name) for name in columns}, **attributes}
+    return frame
 
 
 def arrays_of(table: Any) -> dict[str, np.ndarray]:

@@ -47,10 +47,10 @@ def _short(value):
 
 def by_arguments(thing: object, *parts: object) -> str:
     """Representation of an object as the call that made it, from its attributes and its parts'."""
-    names, found = signature(type(thing)).parameters, {}
+    names, values = signature(type(thing)).parameters, {}
     for part in (*parts, thing):
-        found.update(vars(part))
-    kept = {name: found.get(f"_{name}", found.get(name)) for name in names}
+        values.update(vars(part))
+    kept = {name: values.get(f"_{name}", values.get(name)) for name in names}
     texts = {name: _argument(value) for name, value in kept.items()}
     arguments = ", ".join(f"{name}={text}" for name, text in texts.items() if text)
     return f"{type(thing).__name__}({arguments})"

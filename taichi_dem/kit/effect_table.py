@@ -56,8 +56,8 @@ class Estimate:
     @property
     def row(self) -> dict[str, Any]:
         """What it adds to the table of effects."""
-        found = {"effect": self.effect, "left_out": self.group}
-        return {**found, "advice": self.verdict, "reason": self.words}
+        row = {"effect": self.effect, "left_out": self.group}
+        return {**row, "advice": self.verdict, "reason": self.words}
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file; a group that is not known is None."""
@@ -202,7 +202,7 @@ class EffectTable:
     def droppable(self) -> tuple[str, ...]:
         """Names of the effects that the scene could do without."""
         if self.shown is not None:
-            return tuple(name for name, found in self.shown.items() if found <= self.tolerance)
+            return tuple(name for name, change in self.shown.items() if change <= self.tolerance)
         acted = (use for use in self.acting if not use.idle and use.minor(self.tolerance))
         return *self.inactive, *(use.effect for use in acted if use.rounding or not use.steers)
 
@@ -223,7 +223,7 @@ class EffectTable:
     @property
     def faults(self) -> tuple[str, ...]:
         """What is known to be wrong or missed, in words."""
-        return tuple(one.what for one in self.missing)
+        return tuple(effect.what for effect in self.missing)
 
     @property
     def holds(self) -> bool:
@@ -233,9 +233,9 @@ class EffectTable:
     @property
     def but_for(self) -> tuple[str, ...]:
         """What may have been left out that is not negligible, and what the report warns of."""
-        unclear = (one for one in self.left_out if one.verdict != NEGLIGIBLE)
+        unclear = (estimate for estimate in self.left_out if estimate.verdict != NEGLIGIBLE)
         findings = (sentence.partition(": ")[0] for sentence in self.warnings)
-        return *(f"{one.effect} ({one.verdict})" for one in unclear), *findings
+        return *(f"{estimate.effect} ({estimate.verdict})" for estimate in unclear), *findings
 
     @property
     def grade(self) -> str:
@@ -245,7 +245,7 @@ class EffectTable:
     @property
     def failure(self) -> str:
         """Why the certificate does not hold, and a remedy; ``""`` where it holds."""
-        lacked = ", ".join(one.effect for one in self.missing)
+        lacked = ", ".join(effect.effect for effect in self.missing)
         remedy = f"list {lacked}" if lacked else "run the scene with effects='all'"
         return "" if self.holds else f"{', and '.join(self.faults)}: {remedy}"
 
@@ -267,7 +267,7 @@ class EffectTable:
             without the effect, the difference of a run without it where one was made, else its
             share of the energy; NaN where neither tells. Rows are in its order, the largest first.
         """
-        rows = [*self._rows(), *(one.row for one in (*self.missing, *self.left_out))]
+        rows = [*self._rows(), *(entry.row for entry in (*self.missing, *self.left_out))]
         known = [{n: value for n, value in row.items() if value is not None} for row in rows]
         return data_frame({n: [row.get(n, e) for row in known] for n, e in _COLUMNS.items()})
 
@@ -275,19 +275,19 @@ class EffectTable:
         """A row of each listed effect, in order."""
         for use in self.in_order:
             advice, why = self._advice(use)
-            told = {"listed": True, "influence": self._influence(use), "energy_share": use.share}
-            yield {**vars(use), **told, "advice": advice, "reason": f"{use}{why}"}
+            row = {"listed": True, "influence": self._influence(use), "energy_share": use.share}
+            yield {**vars(use), **row, "advice": advice, "reason": f"{use}{why}"}
 
     def _advice(self, use):
         """What to do about an effect, and why, or what an answer would lose without it."""
-        found = (self.shown or {}).get(use.effect)
+        change = (self.shown or {}).get(use.effect)
         advice = "drop" if use.effect in self.droppable else "keep"
         if use.kept:
             return advice, f"; {use.kept}"
-        if found is not None:
-            differs = f"differs by {100.0 * found:.2g} %"
+        if change is not None:
+            differs = f"differs by {100.0 * change:.2g} %"
             fails = "breaks elsewhere or fails"
-            return advice, f"; a run without it {differs if found < math.inf else fails}"
+            return advice, f"; a run without it {differs if change < math.inf else fails}"
         if advice == "drop" or not use.minor(max(SMALL, self.tolerance)):
             return advice, ""
         more = "" if use.idle or not use.steers else ", and may change more than its energy"

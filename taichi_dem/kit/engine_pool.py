@@ -68,7 +68,7 @@ class Engine:
     @ti.kernel
     def _fill(self):
         # One kernel: Taichi would compile one a field.
-        for field in ti.static([one.field for one in fields_of(self)]):
+        for field in ti.static([saved.field for saved in fields_of(self)]):
             for entry in ti.grouped(field):
                 field[entry] = 0
 

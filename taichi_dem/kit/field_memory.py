@@ -31,16 +31,16 @@ def fields_of(root: object) -> list[FieldOf]:
     """Every field that can be reached from an object, as a list of FieldOf."""
     # Fields are saved unless their class says that they never change or are written before they are
     # read, so that no new part is forgotten.
-    found, seen, ahead = [], set(), [("", "saved", root)]
+    entries, seen, ahead = [], set(), [("", "saved", root)]
     while ahead:
         name, kind, thing = ahead.pop(0)
         if id(thing) not in seen:
             seen.add(id(thing))
             if isinstance(thing, ti.Field) and not isinstance(thing, StructField):
-                found.append(FieldOf(name[1:], thing, kind))
+                entries.append(FieldOf(name[1:], thing, kind))
             else:
                 ahead += [(f"{name}.{key}", *rest) for key, *rest in _members(thing, kind)]
-    return found
+    return entries
 
 
 def _members(thing, kind):
@@ -69,7 +69,7 @@ class FieldMemory:
     """Reads and writes the fields of an object bit by bit; kind: as in ``FieldOf``."""
 
     def __init__(self, root: object, kind: str = "saved"):
-        self.fields = {one.name: one.field for one in fields_of(root) if one.kind == kind}
+        self.fields = {entry.name: entry.field for entry in fields_of(root) if entry.kind == kind}
 
     def read(self) -> dict[str, np.ndarray]:
         """Copies of all fields as arrays by name, without the zeros at their ends."""

@@ -109,13 +109,13 @@ def remove_files(folder: FileName, pattern: str) -> None:
 def older_files(folder: FileName, since: float) -> list[str]:
     """Names of files in a folder of a kind that programs write, unchanged since a time, sorted."""
     # Clocks of file systems may lag by two seconds.
-    found = []
+    older = []
     with contextlib.suppress(OSError), os.scandir(os.fspath(folder)) as entries:
         for entry in entries:
             ours = entry.name.lower().endswith(_WRITTEN) and not entry.name.startswith(".")
             if ours and entry.is_file() and entry.stat().st_mtime < since - 2.0:
-                found.append(entry.name)
-    return sorted(found)
+                older.append(entry.name)
+    return sorted(older)
 
 
 def write_whole(path: FileName, write: Callable[[str], object]) -> None:

@@ -24,8 +24,10 @@ def length(vectors: np.ndarray) -> np.ndarray:
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross products of vectors along the last axis, with ``members_last``."""
-    found = [a[..., k] * b[..., m] - a[..., m] * b[..., k] for k, m in ((1, 2), (2, 0), (0, 1))]
-    return np.moveaxis(np.array(found), 0, -1)
+    components = [
+        a[..., k] * b[..., m] - a[..., m] * b[..., k] for k, m in ((1, 2), (2, 0), (0, 1))
+    ]
+    return np.moveaxis(np.array(components), 0, -1)
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -50,15 +52,15 @@ def transposed(matrices: np.ndarray) -> np.ndarray:
 def inverse_factor(matrices: np.ndarray) -> np.ndarray:
     """W with W^T W = A^-1 of symmetric positive definite A, shape (n, m, m); lower triangular."""
     size = matrices.shape[-1]
-    rest, found = matrices.copy(), np.zeros_like(matrices)
-    found[:, range(size), range(size)] = 1.0
+    rest, inverse = matrices.copy(), np.zeros_like(matrices)
+    inverse[:, range(size), range(size)] = 1.0
     for k in range(size):
         pivot = rest[:, k, k]
         for i in range(k + 1, size):
             share = (rest[:, i, k] / pivot)[:, None]
             rest[:, i] = rest[:, i] - share * rest[:, k]
-            found[:, i] = found[:, i] - share * found[:, k]
-    return found / np.sqrt(np.diagonal(rest, axis1=1, axis2=2))[:, :, None]
+            inverse[:, i] = inverse[:, i] - share * inverse[:, k]
+    return inverse / np.sqrt(np.diagonal(rest, axis1=1, axis2=2))[:, :, None]
 
 
 def inverse(matrices: np.ndarray) -> np.ndarray:
@@ -74,8 +76,8 @@ def parts_in_cache(count: int) -> list[slice]:
 
 def largest_eigenvalues(matrices: np.ndarray) -> np.ndarray:
     """Largest eigenvalue of every symmetric matrix, shape (n, m, m)."""
-    found = [_diagonal(matrices[part]) for part in parts_in_cache(len(matrices))]
-    return np.concatenate([np.empty(0), *(values.max(axis=0) for values in found)])
+    parts = [_diagonal(matrices[part]) for part in parts_in_cache(len(matrices))]
+    return np.concatenate([np.empty(0), *(values.max(axis=0) for values in parts)])
 
 
 def weakest_direction(matrix: np.ndarray) -> np.ndarray:

@@ -13,98 +13,100 @@ lane_vectors = ti.types.matrix(3, LANES, real)
 
 
 @ti.func
-def cross(one, other):
+def cross(first, second):
     """Cross products, lane by lane."""
-    made = lane_vectors(0.0)
+    product = lane_vectors(0.0)
     for k in ti.static(range(3)):
         a, b = ti.static((k + 1) % 3, (k + 2) % 3)
         for n in ti.static(range(LANES)):
-            made[k, n] = one[a, n] * other[b, n] - one[b, n] * other[a, n]
-    return made
+            product[k, n] = first[a, n] * second[b, n] - first[b, n] * second[a, n]
+    return product
 
 
 @ti.func
-def dot(one, other):
+def dot(first, second):
     """Scalar products, lane by lane."""
-    made = lane_numbers(0.0)
+    product = lane_numbers(0.0)
     for n in ti.static(range(LANES)):
-        made[n] = one[0, n] * other[0, n] + one[1, n] * other[1, n] + one[2, n] * other[2, n]
-    return made
+        product[n] = (
+            first[0, n] * second[0, n] + first[1, n] * second[1, n] + first[2, n] * second[2, n]
+        )
+    return product
 
 
 @ti.func
 def scaled(numbers, vectors):
     """Vectors times a number a lane."""
-    made = lane_vectors(0.0)
+    products = lane_vectors(0.0)
     for k in ti.static(range(3)):
         for n in ti.static(range(LANES)):
-            made[k, n] = numbers[n] * vectors[k, n]
-    return made
+            products[k, n] = numbers[n] * vectors[k, n]
+    return products
 
 
 @ti.func
 def gathered(field: ti.template(), members, first: ti.template()):
     """Three entries of a vector field at each lane's member, from component first on."""
-    made = lane_vectors(0.0)
+    vectors = lane_vectors(0.0)
     for n in ti.static(range(LANES)):
         entry = field[members[n]]
         for k in ti.static(range(3)):
-            made[k, n] = entry[first + k]
-    return made
+            vectors[k, n] = entry[first + k]
+    return vectors
 
 
 @ti.func
 def gathered_numbers(field: ti.template(), members):
     """Entry of a field of numbers at each lane's member."""
-    made = lane_numbers(0.0)
+    numbers = lane_numbers(0.0)
     for n in ti.static(range(LANES)):
-        made[n] = field[members[n]]
-    return made
+        numbers[n] = field[members[n]]
+    return numbers
 
 
 @ti.func
 def gathered_product(field: ti.template(), members, vectors, turned: ti.template()):
     """Products of the 3x3 matrix at each lane's member, or of its transpose, with its vector."""
-    made = lane_vectors(0.0)
+    products = lane_vectors(0.0)
     for n in ti.static(range(LANES)):
         entry = field[members[n]]
         if ti.static(turned):
             entry = entry.transpose()
         for r in ti.static(range(3)):
-            made[r, n] = (
+            products[r, n] = (
                 entry[r, 0] * vectors[0, n]
                 + entry[r, 1] * vectors[1, n]
                 + entry[r, 2] * vectors[2, n]
             )
-    return made
+    return products
 
 
 @ti.func
 def product(rows: ti.template(), place, vectors):
     """Products of a 3x3 matrix a lane with the lane's vector; rows: three fields of its rows."""
-    made = lane_vectors(0.0)
+    products = lane_vectors(0.0)
     for r in ti.static(range(3)):
         row = rows[r][place]
         for n in ti.static(range(LANES)):
-            made[r, n] = (
+            products[r, n] = (
                 row[0, n] * vectors[0, n] + row[1, n] * vectors[1, n] + row[2, n] * vectors[2, n]
             )
-    return made
+    return products
 
 
 @ti.func
 def transposed_product(rows: ti.template(), place, vectors):
     """The same with the transposed matrices."""
-    made = lane_vectors(0.0)
+    products = lane_vectors(0.0)
     first, second, third = rows[0][place], rows[1][place], rows[2][place]
     for r in ti.static(range(3)):
         for n in ti.static(range(LANES)):
-            made[r, n] = (
+            products[r, n] = (
                 first[r, n] * vectors[0, n]
                 + second[r, n] * vectors[1, n]
                 + third[r, n] * vectors[2, n]
             )
-    return made
+    return products
 
 
 @ti.func
@@ -138,11 +140,11 @@ def _put_number_by_branch(field: ti.template(), g, n, value):
 
 @ti.func
 def _entry_by_branch(field: ti.template(), g, k: ti.template(), n):
-    found = 0.0
+    entry = 0.0
     for m in ti.static(range(LANES)):
         if m == n:
-            found = field[g][k, m]
-    return found
+            entry = field[g][k, m]
+    return entry
 
 
 def access() -> tuple:
@@ -154,6 +156,6 @@ def access() -> tuple:
 
 
 @ti.func
-def row_of(one, other, n: ti.template()):
+def row_of(first, second, n: ti.template()):
     """The vectors of lane n, one after the other: six numbers."""
-    return vec6(one[0, n], one[1, n], one[2, n], other[0, n], other[1, n], other[2, n])
+    return vec6(first[0, n], first[1, n], first[2, n], second[0, n], second[1, n], second[2, n])

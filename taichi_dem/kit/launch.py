@@ -19,10 +19,10 @@ class Launch:
         """Run it with these values; what it returns."""
         if self._prepared is not None and self._prepared.is_of_this_session():
             return self._prepared(values)
-        found = self._kernel(*self._templates, *values)
+        value = self._kernel(*self._templates, *values)
         if are_on():
             self._prepared = prepared(self._kernel, self._templates, values)
-        return found
+        return value
 
     def queue(self, *values: int | np.ndarray) -> None:
         """Run it some time soon, in order, without waiting for what it returns."""

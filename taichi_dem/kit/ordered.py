@@ -26,16 +26,16 @@ def is_serial(places: int) -> bool:
 
 def tasks(phases: tuple, bodies: int) -> tuple[tuple[bool, tuple], ...]:
     """Phases by the loops of a parallel driver: whether each is on one thread, and which."""
-    found: list[tuple[bool, tuple]] = []
+    listed: list[tuple[bool, tuple]] = []
     for phase in phases:
         members = phase[0]
         serial = backend.is_cpu() and members.most == 1
         serial = serial or (members.light and is_serial(bodies))
-        if serial and found and found[-1][0]:
-            found[-1] = True, (*found[-1][1], phase)
+        if serial and listed and listed[-1][0]:
+            listed[-1] = True, (*listed[-1][1], phase)
         else:
-            found.append((serial, (phase,)))
-    return tuple(found)
+            listed.append((serial, (phase,)))
+    return tuple(listed)
 
 
 @ti.data_oriented

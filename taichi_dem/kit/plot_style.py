@@ -95,15 +95,15 @@ SPARE_COLOURS = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BROWN, VIOLET)
 
 def styles_of(names: Iterable[str]) -> dict[str, MethodStyle]:
     """MethodStyle of each name: that of ``STYLES``, or else the name itself and a spare colour."""
-    found = {name: STYLES.get(_SAME.get(name, name)) for name in names}
-    taken = {style.colour for style in found.values() if style}
+    own = {name: STYLES.get(_SAME.get(name, name)) for name in names}
+    taken = {style.colour for style in own.values() if style}
     spare = [colour for colour in SPARE_COLOURS if colour not in taken] or list(SPARE_COLOURS)
-    others = [name for name, style in found.items() if style is None]
-    made = {
+    others = [name for name, style in own.items() if style is None]
+    styles = {
         name: MethodStyle(name, spare[k % len(spare)], "osD^vPX"[k % 7], ("-", "--")[k % 2])
         for k, name in enumerate(others)
     }
-    return {name: style or made[name] for name, style in found.items()}
+    return {name: style or styles[name] for name, style in own.items()}
 
 
 def colour_table(name: str, low: float = 0.0, high: float = 1.0) -> np.ndarray:
@@ -196,7 +196,11 @@ def filming(
 def _draw_changes(canvas, background):
     """Draw what has changed once and what lies over it; returns the pixels of all else."""
     figure = canvas.figure
-    moving = [artist for one in (*map(_layers, figure.axes), figure.texts) for artist in _over(one)]
+    moving = [
+        artist
+        for container in (*map(_layers, figure.axes), figure.texts)
+        for artist in _over(container)
+    ]
     if background is None or not all(artist.get_animated() for artist in moving):
         for artist in moving:
             artist.set_animated(True)
@@ -221,7 +225,7 @@ def _layers(axes):
 
 def _over(layers):
     """Artists from the first on that has changed, now or before."""
-    return itertools.dropwhile(lambda one: not (one.stale or one.get_animated()), layers)
+    return itertools.dropwhile(lambda artist: not (artist.stale or artist.get_animated()), layers)
 
 
 def seconds(value: float) -> str:

@@ -60,7 +60,7 @@ def _under(part, arrays):
 def _check_like(saved, owner):
     """Raise KeyError or ValueError unless arrays are like those that an owner would save now."""
     for name, own in getattr(owner, "example", owner.saved)().items():
-        grows = tuple(one for one in getattr(owner, "grows", ()) if name.startswith(one))
+        grows = tuple(prefix for prefix in getattr(owner, "grows", ()) if name.startswith(prefix))
         if grows and not any(other.startswith(grows) for other in saved):
             continue
         shape, first = saved[name].shape, 1 if grows else 0

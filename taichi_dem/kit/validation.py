@@ -162,7 +162,7 @@ def instance(name: str, value: Any, kind: type | tuple[type, ...]) -> Any:
     """The value; InputError unless it is an object of a class, or of one of several."""
     kinds = kind if isinstance(kind, tuple) else (kind,)
     if not isinstance(value, kinds):
-        names = " or ".join(one.__name__ for one in kinds)
+        names = " or ".join(allowed.__name__ for allowed in kinds)
         article = "an" if names[0] in "AEIOU" else "a"
         raise InputError(f"{name} must be {article} {names}, got {shown(value)}")
     return value
@@ -197,8 +197,8 @@ def file_stem(name: str, value: Any) -> str:
 
 def several(name: str, values: Any, check: Callable[[str, Any], Checked]) -> tuple[Checked, ...]:
     """One value or a sequence as a tuple, each passed through check(name, value); not empty."""
-    one = isinstance(values, (str, bytes, dict)) or not hasattr(values, "__iter__")
-    if one or getattr(values, "ndim", 1) == 0:
+    single = isinstance(values, (str, bytes, dict)) or not hasattr(values, "__iter__")
+    if single or getattr(values, "ndim", 1) == 0:
         values = (values,)
     checked = tuple(check(name, value) for value in values)
     if not checked:
@@ -236,12 +236,12 @@ def real_numbers(name: str, value: Any, least: float = -LARGEST) -> np.ndarray:
     if given.dtype.kind not in "iuf":
         raise InputError(f"{name} must be a number or an array of numbers, got {shown(value)}")
     with np.errstate(over="ignore"):
-        found = given.astype(np.float64)
-    bad = found[~((found >= least) & (found <= LARGEST))]
+        numbers = given.astype(np.float64)
+    bad = numbers[~((numbers >= least) & (numbers <= LARGEST))]
     if bad.size:
         kind = "finite" if least < 0.0 else "zero or positive" if least == 0.0 else "positive"
         raise InputError(
             f"{name} must be {kind} numbers from {least:g} to {LARGEST:g}, "
             f"got {shown(bad[0].item())}"
         )
-    return found
+    return numbers

@@ -29,7 +29,7 @@ def checked_hinge(turns: bool, about: Any) -> Any:
         raise InputError("about must be left out unless turns is True, got " + shown(about))
     try:
         single = np.ndim(about) == 1
-        points = [direction("about", one) for one in ([about] if single else about)]
+        points = [direction("about", point) for point in ([about] if single else about)]
     except (TypeError, ValueError):
         points = []
     if len(points) not in (1, 2) or len({*points}) < len(points):

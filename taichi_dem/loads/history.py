@@ -19,7 +19,7 @@ MOST_POINTS = 4096
 
 def history_points(times: Any, values: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Times [s] and values as tuples of floats."""
-    t, v = (np.atleast_1d(real_numbers(*one)) for one in (("times", times), ("values", values)))
+    t, v = (np.atleast_1d(real_numbers(*named)) for named in (("times", times), ("values", values)))
     if t.ndim != 1 or not 1 <= len(t) <= MOST_POINTS:
         raise InputError(f"times must be 1 to {MOST_POINTS} numbers in a row, got {shown(times)}")
     if t.shape != v.shape:
@@ -41,7 +41,9 @@ def unresolved_histories(effects: Any, step: float) -> tuple[str, ...]:
     """A sentence about each load or support that changes within less than a step [s]."""
     listed = tuple(effects)
     named = zip(names_of(listed), listed)
-    times = ((name, one.change_time()) for name, one in named if isinstance(one, BodyEffect))
+    times = (
+        (name, effect.change_time()) for name, effect in named if isinstance(effect, BodyEffect)
+    )
     return tuple(
         f"{name} changes within {time:.3g} s, "
         f"less than the largest step, {step:.3g} s: its shape over time may be lost, though loads "
@@ -79,14 +81,14 @@ class History:
         # Within a piece the middle value is the mean; a difference of integrals would lose digits.
         first = self._passed(since, 0)
         last = self._passed(until, first)
-        found = self._value(first, 0.5 * (since + until))
+        mean = self._value(first, 0.5 * (since + until))
         if first < last:
             begin, end = self.times[first], self.times[last - 1]
             area = self.integral[last - 1] - self.integral[first]
             area += (begin - since) * self._value(first, 0.5 * (since + begin))
             area += (until - end) * self._value(last, 0.5 * (end + until))
-            found = area / (until - since)
-        return found
+            mean = area / (until - since)
+        return mean
 
     @ti.func
     def changes(self, since, until):
@@ -111,8 +113,8 @@ class History:
 
     @ti.func
     def _value(self, passed, t):
-        found = self.values[ti.max(passed - 1, 0)]
+        value = self.values[ti.max(passed - 1, 0)]
         if 0 < passed and passed < self.count[None]:
             before, after = self.times[passed - 1], self.times[passed]
-            found += (t - before) / (after - before) * (self.values[passed] - found)
-        return found
+            value += (t - before) / (after - before) * (self.values[passed] - value)
+        return value

@@ -251,8 +251,8 @@ class PrescribedMotion(_TurningSupport):
         times, shares = (np.array(points) for points in self._points)
         if not self._frequency:
             back, on = _reach(times, shares)
-            ways = [sorted((x * back, x * on)) if x else (0.0, 0.0) for x in self._velocity]
-            return tuple(way[0] for way in ways), tuple(way[1] for way in ways)
+            paths = [sorted((x * back, x * on)) if x else (0.0, 0.0) for x in self._velocity]
+            return tuple(path[0] for path in paths), tuple(path[1] for path in paths)
         # By parts: |integral of s cos| is at most (|s| + the variation of s) / (angular frequency).
         most = np.abs(shares).max() + np.abs(np.diff(shares)).sum()
         swing = [most * abs(x) / (2.0 * math.pi * self._frequency) for x in self._velocity]
@@ -306,7 +306,8 @@ def _allows(effect, motion):
         return sum(a * b for a, b in zip(effect._normal.tolist(), velocity)) == 0.0
     if isinstance(effect, PrescribedMotion):
         mine, theirs = (
-            (tuple(one._velocity), one._frequency, one._points) for one in (motion, effect)
+            (tuple(support._velocity), support._frequency, support._points)
+            for support in (motion, effect)
         )
         return mine == theirs or not any((*velocity, *effect._velocity))
     return True
@@ -376,7 +377,7 @@ class QuietBoundary(Ground):
 
     def _speeds(self, model, corners, density):
         """Speeds of both waves at each face [m/s]."""
-        found = []
+        speeds = []
         for name, modulus in zip(("p_speed", "s_speed"), wave_moduli(model, corners)):
             speed = np.sqrt(modulus / density)
             given = getattr(self, name)
@@ -385,8 +386,8 @@ class QuietBoundary(Ground):
                     f"{name} of quiet_boundary must be given where no bond is near a face of "
                     f"group {self.group}, got None"
                 )
-            found.append(speed if given is None else np.full(len(speed), given))
-        return found
+            speeds.append(speed if given is None else np.full(len(speed), given))
+        return speeds
 
     @ti.func
     def acts_on(self, i):
@@ -401,7 +402,7 @@ class QuietBoundary(Ground):
     @ti.func
     def _part(self, i, first):
         """A matrix of body i, by rows from an entry on."""
-        found = mat3(0.0)
+        part = mat3(0.0)
         for r, c in ti.static(ti.ndrange(3, 3)):
-            found[r, c] = self.parts[i, first + 3 * r + c]
-        return found
+            part[r, c] = self.parts[i, first + 3 * r + c]
+        return part

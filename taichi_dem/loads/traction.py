@@ -21,15 +21,15 @@ from taichi_dem.state.model import Model
 def checked_stress(name: str, value: Any) -> tuple[float, ...]:
     """Six components of a stress [Pa]: xx, yy, zz, xy, yz, zx."""
     given = [*value] if isinstance(value, (list, tuple, np.ndarray)) else []
-    if len(given) != 6 or not all(finite(one) for one in given):
+    if len(given) != 6 or not all(finite(component) for component in given):
         raise InputError(
             f"{name} must be six numbers in Pa, xx, yy, zz, xy, yz and zx, compression negative, "
             f"got {shown(value)}"
         )
-    found = tuple(float(one) for one in given)
-    if any(found):
-        in_unit(f"largest of {name}", max(found, key=abs), STRENGTH)
-    return found
+    stress = tuple(float(component) for component in given)
+    if any(stress):
+        in_unit(f"largest of {name}", max(stress, key=abs), STRENGTH)
+    return stress
 
 
 def tensor_of(stress: Sequence[float]) -> np.ndarray:
@@ -94,12 +94,12 @@ def check_bonds(model: Model) -> None:
     strength = model.of_bonds(lambda material: material.tensile_strength)
     slope = model.of_bonds(lambda material: material.friction)
     limit = model.of_bonds(lambda material: material.cohesion) - slope * pull
-    for name, found, most in (("tension", pull, strength), ("shear", across, limit)):
-        beyond = np.flatnonzero(found > most)
+    for name, share, most in (("tension", pull, strength), ("shear", across, limit)):
+        beyond = np.flatnonzero(share > most)
         if len(beyond):
             b, top = beyond[0], model.topology
             raise InputError(
-                f"stress must leave every bond below its strength, got a {name} of {found[b]:.3g} "
+                f"stress must leave every bond below its strength, got a {name} of {share[b]:.3g} "
                 f"Pa between bodies {top.master[b]} and {top.slave[b]}, which bear at most "
-                f"{np.broadcast_to(most, found.shape)[b]:.3g} Pa"
+                f"{np.broadcast_to(most, share.shape)[b]:.3g} Pa"
             )

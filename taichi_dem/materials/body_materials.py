@@ -47,7 +47,9 @@ def joined(first: Material, second: Material) -> Material:
     least = {name: min(getattr(first, name), getattr(second, name)) for name in _LEAST}
     series = {name: joined_constants(getattr(first, name), getattr(second, name)) for name in RULES}
     density = 0.5 * (first.density + second.density)
-    wider = max(first, second, key=lambda one: (one.strength_spread, one.strength_volume))
+    wider = max(
+        first, second, key=lambda material: (material.strength_spread, material.strength_volume)
+    )
     spread = {name: getattr(wider, name) for name in ("strength_spread", "strength_volume")}
     return unchecked(first, density=density, **least, **series, **spread)
 
@@ -80,7 +82,8 @@ class BodyMaterials:
         """Constants between materials a and b, entry a, b; contacts have numbers."""
         own = [self._on_mesh(k) for k in range(len(self.materials))]
         return tuple(
-            tuple(one if one is other else joined(one, other) for other in own) for one in own
+            tuple(first if first is second else joined(first, second) for second in own)
+            for first in own
         )
 
     def _on_mesh(self, k):
@@ -93,8 +96,8 @@ class BodyMaterials:
                 numbers[name] = rule.of_mesh(*on_mesh)
             elif isinstance(rule, BondRule):
                 numbers[name] = rule.on_mesh(*on_mesh)
-        made = replace(material, **numbers) if numbers else material
-        return made if material.coarse == REFUSE else self._weakened(made, bodies)
+        fitted = replace(material, **numbers) if numbers else material
+        return fitted if material.coarse == REFUSE else self._weakened(fitted, bodies)
 
     def _weakened(self, material, bodies):
         """The material with a strength at which all bonds of some bodies keep their energy."""
@@ -109,11 +112,11 @@ class BodyMaterials:
         own = [(self.materials[k], row[k], self.of_body == k) for k, row in enumerate(self.pairs)]
         return tuple(
             f"the tensile strength of {given.tensile_strength:.4g} Pa is lowered to "
-            f"{one.tensile_strength:.3g} Pa, with which cracks through elements of up to "
+            f"{material.tensile_strength:.3g} Pa, with which cracks through elements of up to "
             f"{element_sizes(self.mesh)[bodies].max():.3g} m keep the fracture energy of "
             f"{given.fracture_energy:.4g} J/m2"
-            for given, one, bodies in own
-            if one.tensile_strength < given.tensile_strength
+            for given, material, bodies in own
+            if material.tensile_strength < given.tensile_strength
         )
 
     @property
@@ -136,7 +139,7 @@ class BodyMaterials:
     @property
     def is_elastic(self) -> bool:
         """Whether bonds of all materials follow from moduli, as ``from_elastic`` makes them."""
-        return all(isinstance(one.normal_stiffness, BondRule) for one in self.materials)
+        return all(isinstance(material.normal_stiffness, BondRule) for material in self.materials)
 
     @property
     def friction(self) -> float:
@@ -164,26 +167,26 @@ class BodyMaterials:
         bodies = np.stack([topology.master, topology.slave], axis=1)
         stiffness = per_bond(self.mesh, topology, self.density, springs)
         kinds = self.of_body[bodies]
-        found = []
+        pairs = []
         for a, row in enumerate(self.pairs):
             for b, pair in enumerate(row):
                 bonds = np.flatnonzero((kinds == (a, b)).all(axis=1))
                 if len(bonds):
-                    found.append(self._softest(pair, bonds, stiffness[bonds], topology, a != b))
-        return tuple(found)
+                    pairs.append(self._softest(pair, bonds, stiffness[bonds], topology, a != b))
+        return tuple(pairs)
 
     def _softest(self, pair, bonds, stiffness, topology, mixed):
         """What joins some bonds with the least of their stiffnesses, its energy checked."""
         place = int(stiffness[:, 0].argmin())
         bond, normal, shear = bonds[place], stiffness[place, 0], stiffness[:, 1].min()
         numbers = {"normal_stiffness": float(normal), "shear_stiffness": float(shear)}
-        made = unchecked(pair, **numbers)
+        softest = unchecked(pair, **numbers)
         distance = bond_geometry(self.mesh, topology, self.density).distance[bond]
         where = f" at bond {bond}, whose bodies are {distance:.4g} m apart"
         if mixed:
             where += " and of two materials, with the lesser strength and energy of both"
-        check_energy(made, where, self._remedy(made))
-        return made
+        check_energy(softest, where, self._remedy(softest))
+        return softest
 
     def _remedy(self, softest):
         """Size of elements, and their number, with which a bond reaches its strength, in words."""

@@ -84,10 +84,10 @@ class BondRule(Rule):
 
     def on_mesh(self, mesh: Mesh, density: float, bodies: np.ndarray) -> BondRule:
         """The same rule with its typical value for some bodies of a mesh, (n,) truth values."""
-        made = copy.copy(self)
+        fitted = copy.copy(self)
         value = np.median(self.per_bond(mirrored(mesh, density, bodies)))
-        object.__setattr__(made, "typical", float(value))
-        return made
+        object.__setattr__(fitted, "typical", float(value))
+        return fitted
 
     def per_bond(self, bonds: BondGeometry) -> np.ndarray:
         """The constant of every bond, per area, (bond_count,)."""
@@ -178,9 +178,9 @@ class InSeries(BondRule):
     def per_bond(self, bonds: BondGeometry) -> np.ndarray:
         """The constant of every bond per area, (bond_count,)."""
         first, second = (_of_bonds(each, bonds) for each in (self.first, self.second))
-        one = bonds.master_share if isinstance(self.first, BondRule) else 0.5
+        share = bonds.master_share if isinstance(self.first, BondRule) else 0.5
         other = 1.0 - bonds.master_share if isinstance(self.second, BondRule) else 0.5
-        return first * second / (one * second + other * first)
+        return first * second / (share * second + other * first)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -195,13 +195,13 @@ class ByMaterials(BondRule):
 
     def per_bond(self, bonds: BondGeometry) -> np.ndarray:
         """The constant of every bond per area, (bond_count,)."""
-        kinds, found = self.of_body[bonds.bodies], np.zeros(len(bonds.area))
+        kinds, values = self.of_body[bonds.bodies], np.zeros(len(bonds.area))
         for a, row in enumerate(self.constants):
             for b, constant in enumerate(row):
                 chosen = (kinds == (a, b)).all(axis=1)
                 if chosen.any():
-                    found[chosen] = _of_bonds(constant, bonds)[chosen]
-        return found
+                    values[chosen] = _of_bonds(constant, bonds)[chosen]
+        return values
 
 
 def joined_constants(first: Constant, second: Constant) -> Constant:

@@ -18,22 +18,22 @@ def given_strength(mesh: Mesh, given: Any) -> np.ndarray:
     """Factors that a scene asks for, an array (bond_count,) or a function of middles of faces."""
     top = topology_of(mesh)
     middle = mesh.points[top.vertices].mean(axis=1)
-    found = real_numbers("strength", given(middle) if callable(given) else given)
-    if found.shape != (top.bond_count,) or not (found > 0.0).all():
+    strength = real_numbers("strength", given(middle) if callable(given) else given)
+    if strength.shape != (top.bond_count,) or not (strength > 0.0).all():
         raise InputError(
             f"strength must be a positive number for each of {top.bond_count} bonds, as an array "
-            f"or by a function of the middles of their faces, got {shown(found)}"
+            f"or by a function of the middles of their faces, got {shown(strength)}"
         )
-    return found
+    return strength
 
 
 def bond_strength(laid: BodyMaterials, given: Any, seed: int) -> np.ndarray | None:
     """Strength of each bond over that of its material, (bond_count,); None where all have 1."""
-    made = None if given is None else given_strength(laid.mesh, given)
+    factor = None if given is None else given_strength(laid.mesh, given)
     if any(material.strength_spread for material in laid.materials):
         drawn = _drawn(laid, seed)
-        made = drawn if made is None else made * drawn
-    return made
+        factor = drawn if factor is None else factor * drawn
+    return factor
 
 
 def _drawn(laid, seed):
@@ -51,7 +51,7 @@ def strongest(pairs: Iterable[Material], factor: np.ndarray | None) -> tuple[Mat
     if factor is None or not len(factor):
         return tuple(pairs)
     most = float(factor.max())
-    found = tuple(
+    largest = tuple(
         unchecked(
             pair,
             normal_stiffness=float(pair.normal_stiffness) / most,
@@ -59,6 +59,6 @@ def strongest(pairs: Iterable[Material], factor: np.ndarray | None) -> tuple[Mat
         )
         for pair in pairs
     )
-    for pair in found:
+    for pair in largest:
         check_energy(pair, f" of the strongest bond, which has {most:.3g} times the mean strength")
-    return found
+    return largest

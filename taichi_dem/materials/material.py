@@ -331,9 +331,9 @@ def kept_energy(material: Material, stiffness: float) -> Material:
 
 def unchecked(material: Material, **values: Any) -> Material:
     """A copy of a material with other values, without a check."""
-    made = object.__new__(Material)
-    made.__dict__.update(vars(material), **values)
-    return made
+    unchecked_material = object.__new__(Material)
+    unchecked_material.__dict__.update(vars(material), **values)
+    return unchecked_material
 
 
 def harmless(material: Material) -> Material:

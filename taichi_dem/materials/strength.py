@@ -45,12 +45,12 @@ def factors(spread: np.ndarray, reference: np.ndarray, volume: np.ndarray, seed:
 
     spread: relative standard deviation; reference, volume [m3]: of material (0: none), bond.
     """
-    uniform, found = drawn(seed, len(spread)), np.ones(len(spread))
-    for one, size in np.unique(np.stack([spread, reference], axis=1), axis=0):
-        if one > 0.0:
-            here = (spread == one) & (reference == size)
-            modulus = weibull_modulus(one)
+    uniform, factor = drawn(seed, len(spread)), np.ones(len(spread))
+    for scatter, size in np.unique(np.stack([spread, reference], axis=1), axis=0):
+        if scatter > 0.0:
+            here = (spread == scatter) & (reference == size)
+            modulus = weibull_modulus(scatter)
             stronger = (size / volume[here]) ** (1.0 / modulus) if size else 1.0
             part = (-np.log(uniform[here])) ** (1.0 / modulus) / math.gamma(1.0 + 1.0 / modulus)
-            found[here] = np.round(stronger * part, _DIGITS)
-    return np.maximum(found, 10.0**-_DIGITS)
+            factor[here] = np.round(stronger * part, _DIGITS)
+    return np.maximum(factor, 10.0**-_DIGITS)

@@ -19,16 +19,16 @@ def angular_momenta(orientation: np.ndarray, spin: np.ndarray, inertia: np.ndarr
     orientation: unit quaternions (n, 4). spin: in world axes (n, 3) [rad/s]. inertia: in body axes
     (n, 3, 3) [kg m^2].
     """
-    found = np.empty((len(spin), 3))
-    _launch_momenta(*_rows(orientation, spin, inertia), found)
-    return found
+    momenta = np.empty((len(spin), 3))
+    _launch_momenta(*_rows(orientation, spin, inertia), momenta)
+    return momenta
 
 
 def rotations(orientation: np.ndarray) -> np.ndarray:
     """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
-    found = np.empty((len(orientation), 3, 3))
-    _launch_rotations(*_rows(orientation), found)
-    return found
+    matrices = np.empty((len(orientation), 3, 3))
+    _launch_rotations(*_rows(orientation), matrices)
+    return matrices
 
 
 def spins(orientation: np.ndarray, inertia_inverse: np.ndarray, momentum: np.ndarray) -> np.ndarray:
@@ -37,9 +37,9 @@ def spins(orientation: np.ndarray, inertia_inverse: np.ndarray, momentum: np.nda
     orientation: unit quaternions (n, 4). inertia_inverse: in body axes (n, 3, 3) [1/(kg m^2)].
     momentum: angular, in world axes (n, 3) [kg m^2/s].
     """
-    found = np.empty((len(momentum), 3))
-    _launch_spins(*_rows(orientation, inertia_inverse, momentum), found)
-    return found
+    spin_rates = np.empty((len(momentum), 3))
+    _launch_spins(*_rows(orientation, inertia_inverse, momentum), spin_rates)
+    return spin_rates
 
 
 def _rows(*arrays):
@@ -53,10 +53,10 @@ def _vector(rows: ti.template(), i):
 
 @ti.func
 def _matrix(matrices: ti.template(), i):
-    found = mat3(0.0)
+    matrix = mat3(0.0)
     for r, c in ti.static(ti.ndrange(3, 3)):
-        found[r, c] = matrices[i, r, c]
-    return found
+        matrix[r, c] = matrices[i, r, c]
+    return matrix
 
 
 @ti.func

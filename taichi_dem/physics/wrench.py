@@ -61,9 +61,9 @@ def coupled_mobility(coupling_i, coupling_j, branch):
 
 
 @ti.func
-def plus(one, other):
+def plus(first, second):
     """Sum of two blocks."""
-    return Block(a=one.a + other.a, b=one.b + other.b, c=one.c + other.c)
+    return Block(a=first.a + second.a, b=first.b + second.b, c=first.c + second.c)
 
 
 @ti.func

@@ -44,9 +44,9 @@ def plot_columns(
     factor, unit = scale(float(np.abs(table["time_s"]).max(initial=0.0)), "s")
     shape = {"size": (6.4, 1.0 + 2.2 * len(units)), "sharex": True, "squeeze": False}
     with picture(path, max(1, len(units)), 1, **shape) as (figure, panels):
-        for axes, one in zip(panels[:, 0], units):
-            group = [name for name in names if unit_of(name) == one]
-            _draw(axes, factor * table["time_s"], table, group, one)
+        for axes, panel_unit in zip(panels[:, 0], units):
+            group = [name for name in names if unit_of(name) == panel_unit]
+            _draw(axes, factor * table["time_s"], table, group, panel_unit)
         panels[-1, 0].set(xlabel=f"time [{unit}]")
     return figure
 
@@ -175,14 +175,14 @@ def plot_block(
 ) -> Figure:
     """Draw the bodies in a frame where they are, coloured by a value."""
     magnify, axis = positive("magnify", magnify), unit_vector("axis", axis).tolist()
-    one, view, model = result.frame(frame), View(axis), result.model
-    values, broken = body_values(result, one, colour), result.broken_time <= one.time_s
+    shown, view, model = result.frame(frame), View(axis), result.model
+    values, broken = body_values(result, shown, colour), result.broken_time <= shown.time_s
     options: dict[str, Any] = {"magnify": magnify, "axis": axis, "broken": broken}
     with picture(path, size=(6.2, 4.8)) as (figure, axes):
         if colour == "fragment":
             look: dict[str, Any] = {"cmap": ListedColormap([*SPARE_COLOURS[:_NAMED], JOINT])}
             look["clim"] = (0, _NAMED)
-            draw_bodies(axes, model, one, np.minimum(values, _NAMED), **options, **look)
+            draw_bodies(axes, model, shown, np.minimum(values, _NAMED), **options, **look)
             _name_fragments(figure, model.body_mass, values)
         else:
             unit, words = COLOURS[colour]
@@ -190,14 +190,14 @@ def plot_block(
             top = float(values.max()) if unit == "1" else scale_end(values)
             factor, unit = scale(top, unit) if unit != "1" else (1.0, unit)
             look = {"cmap": "viridis", "clim": (0.0, factor * top or 1.0)}
-            drawn = draw_bodies(axes, model, one, factor * values, **options, **look)
+            drawn = draw_bodies(axes, model, shown, factor * values, **options, **look)
             beyond = "max" if values.max() > top else "neither"
             label = f"{words} [{unit}]"
             figure.colorbar(drawn, ax=axes, label=label, aspect=25, extend=beyond)
         frame_block(axes, view, model, 0.1)
         axes.set(xlabel=view.labels()[0], ylabel=view.labels()[1])
         note = "" if magnify == 1.0 else f", displacement × {magnify:g}"
-        axes.set_title(f"t = {1e3 * one.time_s:.3g} ms{note}")
+        axes.set_title(f"t = {1e3 * shown.time_s:.3g} ms{note}")
     return figure
 
 

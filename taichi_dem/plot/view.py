@@ -103,10 +103,10 @@ def first_breaks(
     times = np.repeat(broken_time[broken], 3)
     order = np.lexsort((times, cracked))
     keys, first = np.unique(cracked[order], return_index=True)
-    wanted, found = _edge_keys(edges, mesh.point_count), np.full(len(edges), np.nan)
+    wanted, break_times = _edge_keys(edges, mesh.point_count), np.full(len(edges), np.nan)
     hit = np.isin(wanted, keys)
-    found[hit] = times[order[first[np.searchsorted(keys, wanted[hit])]]]
-    return found
+    break_times[hit] = times[order[first[np.searchsorted(keys, wanted[hit])]]]
+    return break_times
 
 
 def _edges(triangles):

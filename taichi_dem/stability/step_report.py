@@ -287,7 +287,10 @@ def elastic_report(scene: Scene) -> ElasticReport:
     if not laid.is_one:
         alone, asked = [mesh_stiffness(mesh, each) for each in laid.materials], None
     pairs = zip(alone, laid.materials)
-    lengths = [own.young * one.fracture_energy / one.tensile_strength**2 for own, one in pairs]
+    lengths = [
+        own.young * material.fracture_energy / material.tensile_strength**2
+        for own, material in pairs
+    ]
     return ElasticReport(stiffness, asked, np.array(lengths)[laid.of_body], sizes, steps)
 
 

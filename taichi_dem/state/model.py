@@ -92,12 +92,12 @@ class Model:
 
     def harmless(self) -> "Model":
         """A copy with the materials with which silent effects never act."""
-        made = copy.copy(self)
+        copied = copy.copy(self)
         laid = self.materials
         changed = tuple(map(harmless, laid.materials))
-        made.materials = BodyMaterials(laid.mesh, changed, laid.of_body)
-        made.material = made.materials.pairs[0][0]
-        return made
+        copied.materials = BodyMaterials(laid.mesh, changed, laid.of_body)
+        copied.material = copied.materials.pairs[0][0]
+        return copied
 
     def of_bonds(self, value: Callable[[Material], float]) -> Any:
         """A number of what joins the bodies of each bond, an array (n,), or one for all."""
@@ -199,8 +199,8 @@ class Model:
         return self.start_tractions / self.bond_stiffness[:, [0, 1, 1]]
 
     def _per_bond(self, constants):
-        found = per_bond(self.mesh, self.topology, self.materials.density, constants)
-        return found if self.strength is None else found / self.strength[:, None]
+        numbers = per_bond(self.mesh, self.topology, self.materials.density, constants)
+        return numbers if self.strength is None else numbers / self.strength[:, None]
 
 
 def sums(group: np.ndarray, of_members: np.ndarray, count: int = 0) -> np.ndarray:

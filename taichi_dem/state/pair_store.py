@@ -194,15 +194,15 @@ class PairStore:
     @ti.func
     def _former(self, p, spheres, nth):
         """Present place of two spheres of a pair, -1 where they are not listed."""
-        first, last, found = self.first[p], self.last[p], -1
+        first, last, slot = self.first[p], self.last[p], -1
         if first + nth < last:
             if self._is(first + nth, spheres):
-                found = first + nth
-        if found < 0:
+                slot = first + nth
+        if slot < 0:
             for k in range(first, last):
                 if self._is(k, spheres):
-                    found = k
-        return found
+                    slot = k
+        return slot
 
     @ti.func
     def _is(self, k, spheres):

@@ -257,18 +257,18 @@ class State:
 
     def motion(self) -> dict[str, np.ndarray]:
         """Arrays of the bodies' motion by name."""
-        found = self.stored()
+        stored = self.stored()
         # The stored spin is that of the orientation before the last turn.
         inverse = values(self.tables.inertia_inverse, slice(self.body_count))
-        found["spin"] = spins(found["orientation"], inverse, found["angular_momentum"])
-        return found
+        stored["spin"] = spins(stored["orientation"], inverse, stored["angular_momentum"])
+        return stored
 
     def stored(self) -> dict[str, np.ndarray]:
         """The same arrays with the spin that the fields have, that before the last turn."""
         here = slice(self.body_count)
         names = (*_GIVEN, "angular_momentum", "level")
-        found = {name: values(getattr(self, name), here) for name in names}
-        return {**found, "rotation": rotations(found["orientation"])}
+        arrays = {name: values(getattr(self, name), here) for name in names}
+        return {**arrays, "rotation": rotations(arrays["orientation"])}
 
     def fields(self) -> dict[str, ti.Field]:
         """Every field that changes, and those of the bound effects, by name."""

@@ -185,8 +185,8 @@ class Tables:
     def matched(self, model: Model) -> list[tuple[Any, Any]]:
         """Pairs of an effect bound here and the corresponding one of a model; no null objects."""
         bound = {role: iter([e for e in self.effects if e.role == role]) for role in ROLES}
-        found = [(next(bound[given.role]), given) for given in model.effects]
-        return [*found, *([(self.geometry, model.geometry)] if self.has_contact else [])]
+        pairs = [(next(bound[given.role]), given) for given in model.effects]
+        return [*pairs, *([(self.geometry, model.geometry)] if self.has_contact else [])]
 
     def _load_bonds(self, model):
         bonds = model.bonds

@@ -51,19 +51,19 @@ class BondForces:
     def answer(self, b, dt, motion, moved):
         """``BondAnswer`` at a motion, for a step [s]; moved: by how much springs stretch now."""
         stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
-        found, scale = BondAnswer(), self.share(b)
+        answer, scale = BondAnswer(), self.share(b)
         for q in range(3):
             u = 3 * b + q
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
             before = self.law.residual_slip(m, u)
             traction, spent, broken = self.by_law(m, b, u, stiffness, opening)
-            way = dt * unit_velocity(moved, arm)
-            found.worked += dot(traction, way)
+            travel = dt * unit_velocity(moved, arm)
+            answer.worked += dot(traction, travel)
             if spent != 0.0:
                 # Booked at the mean of the tractions before and after the step.
                 slip = self.law.residual_slip(m, u) - before
-                spent -= 0.5 * stiffness[1] * dot(vec2(way[1], way[2]), slip)
+                spent -= 0.5 * stiffness[1] * dot(vec2(travel[1], travel[2]), slip)
             if ti.static(self.notes_limits):
                 across = vec2(traction[1], traction[2])
                 self.state.note_passed(m, b, traction[0], squared(across))
@@ -71,12 +71,12 @@ class BondForces:
                 velocity = unit_velocity(motion, arm)
                 drag = scale * self.dashpot.traction(m, b, velocity)
                 traction += drag
-                found.dragged += dot(drag, velocity)
-            found.force += traction
-            found.torque += cross(arm, traction)
-            found.slipped += spent
-            found.failed |= broken
-        return found
+                answer.dragged += dot(drag, velocity)
+            answer.force += traction
+            answer.torque += cross(arm, traction)
+            answer.slipped += spent
+            answer.failed |= broken
+        return answer
 
     @ti.func
     def by_law(self, m, b, u, stiffness, opening):
@@ -103,18 +103,18 @@ class BondForces:
         return share
 
     @ti.func
-    def pull(self, b, dt, motion, found):
+    def pull(self, b, dt, motion, answer):
         """Add the impulse of a ``BondAnswer`` to both bodies, and book what it took."""
         area, slots = self.tables.unit_area[b], self.tables.bond_slots[b]
-        linear = transposed_matvec(motion.axes, found.force * (area * dt))
+        linear = transposed_matvec(motion.axes, answer.force * (area * dt))
         # About the slave's centre.
-        angular = transposed_matvec(motion.axes, found.torque * (area * dt))
+        angular = transposed_matvec(motion.axes, answer.torque * (area * dt))
         self._push(slots[0], stacked(linear, angular + cross(motion.branch, linear)))
         self._push(slots[1], stacked(-linear, -angular))
-        self.book_drag(b, area * (found.dragged * dt))
+        self.book_drag(b, area * (answer.dragged * dt))
         if ti.static(not self.law.is_null):
-            if found.slipped != 0.0:
-                self._book_heat(b, area * vec2(found.slipped, 0.0))
+            if answer.slipped != 0.0:
+                self._book_heat(b, area * vec2(answer.slipped, 0.0))
 
     @ti.func
     def _push(self, slot, impulse):
@@ -133,12 +133,12 @@ class BondForces:
         self.state.bond_heat[b] = self.state.bond_heat[b] + energies
 
     @ti.func
-    def release(self, b, motion, found):
+    def release(self, b, motion, answer):
         """Release a bond with a failed unit: its faces carry contact spheres from now on."""
         if ti.static(not self.law.is_null):
             # The springs have acted for the first half of the step to here.
-            freed = self._stored(b, motion) - 0.5 * found.worked
-            self._book_heat(b, self.tables.unit_area[b] * vec2(found.slipped, freed))
+            freed = self._stored(b, motion) - 0.5 * answer.worked
+            self._book_heat(b, self.tables.unit_area[b] * vec2(answer.slipped, freed))
         slots, tick = self.tables.bond_slots[b], self.state.tick[None]
         self.state.broken_tick[b] = tick
         for side in ti.static(range(2)):

@@ -30,15 +30,15 @@ class TangentialSprings:
         return elapsed
 
     @ti.func
-    def follow(self, k, rotation, normal, way):
+    def follow(self, k, rotation, normal, slip):
         """Stretch the spring of sphere pair k by ``way`` [m]."""
         across = transposed_matvec(rotation, normal)
-        self.friction.follow(k, across, transposed_matvec(rotation, way))
+        self.friction.follow(k, across, transposed_matvec(rotation, slip))
 
     @ti.func
-    def slip(self, m, k, rotation, bound, way):
+    def slip(self, m, k, rotation, bound, moved):
         """Shorten the spring of sphere pair k to a bound [N] after ``way`` [m]; energy [J]."""
-        return self.friction.slip(m, k, bound, transposed_matvec(rotation, way))
+        return self.friction.slip(m, k, bound, transposed_matvec(rotation, moved))
 
     @ti.func
     def force(self, m, k, rotation):
@@ -93,22 +93,22 @@ class ContactForces:
         self.limited = self.has_limits and schedule.limits.limited
 
     @ti.func
-    def push(self, p, dt, found):
+    def push(self, p, dt, forces):
         """Add the impulses of a pair's forces in a time [s] to both bodies, and their heat."""
-        self.contacts.add_impulse(p, 0, -found.force * dt, found.moment_i * dt)
-        self.contacts.add_impulse(p, 1, found.force * dt, found.moment_j * dt)
-        heat = dt * vec4(found.dragged, found.rubbed, 0.0, 0.0)
+        self.contacts.add_impulse(p, 0, -forces.force * dt, forces.moment_i * dt)
+        self.contacts.add_impulse(p, 1, forces.force * dt, forces.moment_j * dt)
+        heat = dt * vec4(forces.dragged, forces.rubbed, 0.0, 0.0)
         self.store.heat[p] = self.store.heat[p] + heat
 
     @ti.func
-    def book(self, p, found):
+    def book(self, p, forces):
         """Note what acted in a pair, its depth, and what springs and law took for good."""
         pair = self.store.body[p]
-        if found.active != 0:
+        if forces.active != 0:
             for side in ti.static(range(2)):
-                self.state.note_active(pair[side], found.active)
-        self.book_taken(p, found.slipped, found.spent)
-        self.contacts.note_depth(p, found.deepest)
+                self.state.note_active(pair[side], forces.active)
+        self.book_taken(p, forces.slipped, forces.spent)
+        self.contacts.note_depth(p, forces.deepest)
 
     @ti.func
     def book_taken(self, p, slipped, spent):
@@ -143,50 +143,50 @@ class ContactForces:
         i, j = pair[0], pair[1]
         # Most candidates do not touch: tested in the first body's frame, at half the cost.
         branch, rotation, turn, offset = self.frame(i, j)
-        found, scale, m = PairForces(), 1.0, self.tables.pair(i, j)
+        forces, scale, m = PairForces(), 1.0, self.tables.pair(i, j)
         if ti.static(self.limited):
             scale = self.share(i, j)
         for k in range(self.store.first[p], self.store.last[p]):
             near = self.contacts.look(k, i, j, turn, offset, margin, stepping)
             if ti.static(self.has_limits):
-                found.near_count += ti.cast(self.geometry.is_within(near, margin), ti.i32)
+                forces.near_count += ti.cast(self.geometry.is_within(near, margin), ti.i32)
             if self.geometry.is_within(near, 0.0) or self.holds(k):
                 met, touch, velocity = self.touch(k, i, j, near, rotation, branch)
                 push, arm = self.law.push(m, k, touch), met.arm
                 given = self.answer(m, k, i, met, touch, push, velocity, scale, elapsed, stepping)
-                found.active |= active_bits(given.pressed, given.rub)
-                found.force += given.force
-                found.moment_i -= cross(arm, given.force)
-                found.moment_j += cross(arm - branch, given.force)
+                forces.active |= active_bits(given.pressed, given.rub)
+                forces.force += given.force
+                forces.moment_i -= cross(arm, given.force)
+                forces.moment_j += cross(arm - branch, given.force)
                 if ti.static(not self.geometry.by_face):
-                    found.moment_i -= given.pressed * met.couple
-                    found.moment_j += given.pressed * met.couple
-                found.dragged += (met.area * push.elastic - given.pressed) * touch.rate
-                found.rubbed += given.rubbed
-                found.slipped += given.slipped
-                found.spent += met.area * push.spent
-                found.rub += norm(given.rub)
-                found.bound += self.friction.limit(m, given.pressed)
-                found.deepest = ti.max(found.deepest, self.geometry.depth(near, met.overlap))
+                    forces.moment_i -= given.pressed * met.couple
+                    forces.moment_j += given.pressed * met.couple
+                forces.dragged += (met.area * push.elastic - given.pressed) * touch.rate
+                forces.rubbed += given.rubbed
+                forces.slipped += given.slipped
+                forces.spent += met.area * push.spent
+                forces.rub += norm(given.rub)
+                forces.bound += self.friction.limit(m, given.pressed)
+                forces.deepest = ti.max(forces.deepest, self.geometry.depth(near, met.overlap))
                 if ti.static(not stepping):
-                    found.stored += met.area * self.law.stored(m, k, touch)
-                    found.leverage += self._leverage(met, given.force, given.pressed)
+                    forces.stored += met.area * self.law.stored(m, k, touch)
+                    forces.leverage += self._leverage(met, given.force, given.pressed)
                 elif ti.static(self.law.has_memory):
                     self.law.keep(m, k, touch)
             elif ti.static(stepping):
-                found.slipped += self.part(m, k)
+                forces.slipped += self.part(m, k)
             if ti.static(not stepping):
-                found.stored += self.friction.stored(m, k)
-        return found
+                forces.stored += self.friction.stored(m, k)
+        return forces
 
     @ti.func
     def _leverage(self, met, pushed, push):
         """Forces on the second body times their arms from the first [N m], where bodies meet."""
         # A pressed face also has a couple; its part along the normal changes no stress.
-        found = pushed.outer_product(met.arm)
+        leverage = pushed.outer_product(met.arm)
         if ti.static(not self.geometry.by_face):
-            found += met.normal.outer_product(cross(met.normal, push * met.couple))
-        return found
+            leverage += met.normal.outer_product(cross(met.normal, push * met.couple))
+        return leverage
 
     @ti.func
     def holds(self, k):

@@ -62,10 +62,10 @@ class Resident:
         """Advance some substeps, or to a tick or the next halt; how many."""
         done = 0
         while True:
-            found = self._launch_steps(0, end_tick, substeps - done)
-            if found >= 0:
-                return done + found
-            done += -1 - found
+            ending = self._launch_steps(0, end_tick, substeps - done)
+            if ending >= 0:
+                return done + ending
+            done += -1 - ending
             self._launch_search()
 
     def run(self, end_tick: int) -> None:
@@ -208,9 +208,9 @@ class Parallel:
             pass
         self._take(self._groups[-1](end_tick, 1, 1))
 
-    def _take(self, found):
+    def _take(self, ending):
         """Take over how the last substep ended, and how many sweeps the next one may need."""
-        self.state, self.sweeps = found & _ENDS, found // (_ENDS + 1)
+        self.state, self.sweeps = ending & _ENDS, ending // (_ENDS + 1)
 
     @ti.kernel
     def _run(self, number: ti.template(), end_tick: ti.i64, rest: ti.i32, first: ti.i32) -> ti.i32:
@@ -259,20 +259,20 @@ class Parallel:
     @ti.func
     def _ended(self, number: ti.template(), end_tick, rest):
         """Whether sweeps are repeated; of the last group how the substep ended, which it notes."""
-        found = 0
+        ending = 0
         if ti.static(self.step.groups[number].sweeps):
-            found = self.step.solver.unsolved[None]
+            ending = self.step.solver.unsolved[None]
         if ti.static(number == len(self.step.groups) - 1):
             if rest == 1 and self.ended[None] == 0:
-                found = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
-                found |= self.step.halted()
+                ending = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
+                ending |= self.step.halted()
                 if ti.static(self.step.has_contact):
-                    found |= _SEARCH * self.step.search.is_requested()
+                    ending |= _SEARCH * self.step.search.is_requested()
                 if ti.static(backend.most_rounds() > 0):
-                    found |= _CUT_SHORT * self.step.state.cut_short[None]
+                    ending |= _CUT_SHORT * self.step.state.cut_short[None]
                 if self._waits(number) == 1:
-                    found = _UNSOLVED
-                self.ended[None] = found
+                    ending = _UNSOLVED
+                self.ended[None] = ending
                 # As many sweeps as this substep has made, or one fewer than were wanted before it.
                 wanted = self.wanted[None] - 1
                 if ti.static(self.step.solves):
@@ -280,8 +280,8 @@ class Parallel:
                 else:
                     wanted = ti.max(wanted, 0)
                 self.wanted[None] = wanted
-            found = self.ended[None] + (_ENDS + 1) * self.wanted[None]
-        return found
+            ending = self.ended[None] + (_ENDS + 1) * self.wanted[None]
+        return ending
 
 
 #: Drivers by name.

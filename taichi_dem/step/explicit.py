@@ -38,7 +38,7 @@ class ExplicitStep(Step):
     def phases(self) -> tuple:
         """The phases in order."""
         schedule, lists = self.schedule, self.schedule.lists
-        one, everyone, controlled = Once(), lists.bodies.everyone, schedule.controlled
+        once, everyone, controlled = Once(), lists.bodies.everyone, schedule.controlled
         limits, limit = schedule.limits or ABSENT, schedule.level_limit or ABSENT
         sleep, waking = schedule.sleeping or ABSENT, schedule.waking or ABSENT
         return (
@@ -47,11 +47,11 @@ class ExplicitStep(Step):
             (START, everyone, sleep.begin),
             (START, everyone, sleep.begin_beside),
             (START, everyone, self.first_level),
-            (START, one, given(schedule.uniform, schedule.level_all)),
-            (START, one, waking.begin),
+            (START, once, given(schedule.uniform, schedule.level_all)),
+            (START, once, waking.begin),
             (START, everyone, limit.note),
             (START, lists.filling()),
-            (START, one, schedule.end_listing),
+            (START, once, schedule.end_listing),
             # Bodies whose bonds or contacts changed find their stable steps anew, and a controlled
             # one that needs a shorter step now is brought to the present and takes it.
             (STEP, limits, given(not controlled, limits.refresh_last)),
@@ -61,10 +61,10 @@ class ExplicitStep(Step):
             # Contacts that are due give their impulse for the smaller of the bodies' two steps.
             (STEP, lists.pairs, given(self.has_contact, self.contact)),
             # The clock moves to the next tick at which a body is due.
-            (STEP, one, schedule.advance_clock),
+            (STEP, once, schedule.advance_clock),
             # The speed from which on a body wakes those that sleep beside it.
             (STEP, sleep, sleep.chunk),
-            (STEP, one, waking.sort),
+            (STEP, once, waking.sort),
             # Bodies that are due take their impulses, move, and choose their next level.
             (STEP, lists.bodies, self.body),
             # Members of another level, and bonds that broke, move in the lists.
@@ -129,13 +129,13 @@ class ExplicitStep(Step):
             slots, motion = self.tables.bond_slots[b], self.state.bond_motion(b)
             i, j = slots[0] >> 2, slots[1] >> 2
             dt = self.schedule.pair_step(i, j)
-            found = self.bonds.answer(b, dt, motion, motion)
+            answer = self.bonds.answer(b, dt, motion, motion)
             if ti.static(self.schedule.controlled):
                 self.schedule.applied_until.bond[b] = self.schedule.applied_until.until(i, j)
-            if found.failed == 0:
-                self.bonds.pull(b, dt, motion, found)
+            if answer.failed == 0:
+                self.bonds.pull(b, dt, motion, answer)
             else:
-                self.bonds.release(b, motion, found)
+                self.bonds.release(b, motion, answer)
 
     @ti.func
     def contact(self, p):
@@ -147,12 +147,12 @@ class ExplicitStep(Step):
             elapsed = self.pairs.springs.elapsed(p)
         if ti.static(self.schedule.has_limits):
             margin = self.schedule.limits.contact_limits.margin(i, j)
-        found = self.pairs.forces_of(p, elapsed, margin, True)
-        if found.deepest > 0.0:
-            self.pairs.push(p, self.pairs.pair_step(p, i, j), found)
-        self.pairs.book(p, found)
+        forces = self.pairs.forces_of(p, elapsed, margin, True)
+        if forces.deepest > 0.0:
+            self.pairs.push(p, self.pairs.pair_step(p, i, j), forces)
+        self.pairs.book(p, forces)
         if ti.static(self.schedule.has_limits):
-            self.schedule.limits.notice_pair(p, found.near_count, HIT)
+            self.schedule.limits.notice_pair(p, forces.near_count, HIT)
 
     @ti.func
     def bond_power(self, b, motion):

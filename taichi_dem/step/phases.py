@@ -65,12 +65,12 @@ class Group(NamedTuple):
 
 def of_time(rows: tuple, *times: When) -> tuple[Phase, ...]:
     """The present phases of some times; a row is (when, members, item) or (when, phases)."""
-    found: list[Phase] = []
+    chosen: list[Phase] = []
     for when, *rest in rows:
         if when in times and not any(part is ABSENT for part in rest):
             phases = rest[0] if len(rest) == 1 else (rest,)
-            found += (Phase(*phase, when is ALWAYS) for phase in phases)
-    return tuple(found)
+            chosen += (Phase(*phase, when is ALWAYS) for phase in phases)
+    return tuple(chosen)
 
 
 def groups_of(rows: tuple) -> tuple[Group, ...]:

@@ -105,13 +105,13 @@ class Sleeping(Places):
         i, j = slots[0] >> 2, slots[1] >> 2
         if self.since[i] < 0 or (self.since[j] >= 0 and self.since[j] < self.since[i]):
             i = j
-        last, found = 0.0, vec2(0.0, 0.0)
+        last, left_out = 0.0, vec2(0.0, 0.0)
         if ti.static(moved):
             last = self.stride[i]
         ticks = self.state.tick[None] - self.since[i]
         if 0 <= self.since[i] and 0 < ticks:
-            found = self._withheld(b, ti.cast(ticks, real) * seconds, last, self.rounding(i))
-        return found
+            left_out = self._withheld(b, ti.cast(ticks, real) * seconds, last, self.rounding(i))
+        return left_out
 
     @ti.func
     def _withheld(self, b, elapsed, last, rounding):
@@ -183,7 +183,7 @@ class Sleeping(Places):
     @ti.func
     def _opens(self, i, is_fast):
         """Whether body i opens a bond to a body that slept until now by more than is allowed."""
-        found = False
+        opens = False
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
             if b >= 0:
@@ -193,8 +193,8 @@ class Sleeping(Places):
                 if slept and self.state.broken_tick[b] < 0:
                     energy, is_more = self._held(b, i, j, self.bound2[self.part[i]])
                     if is_more or (is_fast and energy > 0.0):
-                        found = True
-        return found
+                        opens = True
+        return opens
 
     @ti.func
     def _held(self, b, i, j, speed2):

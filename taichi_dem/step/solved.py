@@ -40,7 +40,7 @@ class SolvedStep(Step):
     def phases(self) -> tuple:
         """The phases in order."""
         schedule, lists, solver = self.schedule, self.schedule.lists, self.solver
-        one, bodies, bonds = Once(), lists.bodies.everyone, lists.bonds.everyone
+        once, bodies, bonds = Once(), lists.bodies.everyone, lists.bonds.everyone
         sleep, waking = schedule.sleeping or ABSENT, schedule.waking or ABSENT
         dashpots, pairs = solver.bonds or ABSENT, solver.pairs or ABSENT
         ground = solver.ground or ABSENT
@@ -49,10 +49,10 @@ class SolvedStep(Step):
             (START, bodies, sleep.begin),
             (START, bodies, sleep.begin_beside),
             (START, bodies, self.first_level),
-            (START, one, schedule.level_all),
-            (START, one, waking.begin),
+            (START, once, schedule.level_all),
+            (START, once, waking.begin),
             (START, lists.filling()),
-            (START, one, schedule.end_listing),
+            (START, once, schedule.end_listing),
             (START, bodies, self.update_inertia),
             (START, bonds, dashpots.first),
             # Contacts that act, or may within the step, are found, and coloured: those of one
@@ -60,18 +60,18 @@ class SolvedStep(Step):
             (STEP, lists.pairs, pairs.begin),
             (STEP, pairs.phases),
             # The clock moves on.
-            (STEP, one, schedule.advance_clock),
+            (STEP, once, schedule.advance_clock),
             # The speed from which on a body wakes those that sleep beside it.
             (STEP, sleep, sleep.chunk),
-            (STEP, one, waking.sort),
+            (STEP, once, waking.sort),
             # Velocities are predicted with springs, loads and the dashpots of the step before.
-            (STEP, one, solver.begin),
+            (STEP, once, solver.begin),
             (STEP, lists.bodies, self.predict),
             # Sweeps correct them until no dashpot changes them further.
             (SWEEP, dashpots.by_colour, dashpots.visit),
             (SWEEP, pairs.by_colour, pairs.visit),
             (SWEEP, lists.bodies, ground.visit),
-            (SWEEP, one, solver.check_convergence),
+            (SWEEP, once, solver.check_convergence),
             # What contacts took is booked.
             (STEP, lists.pairs, pairs.book_sweeps),
             # Bodies take these velocities and move.
@@ -184,15 +184,15 @@ class SolvedStep(Step):
                 self.schedule.step_seconds[0],
             )
             motion = self._answered(b, moved)
-            found = self.bonds.answer(b, dt, motion, moved)
-            if found.failed == 0:
-                self.bonds.pull(b, dt, motion, found)
+            answer = self.bonds.answer(b, dt, motion, moved)
+            if answer.failed == 0:
+                self.bonds.pull(b, dt, motion, answer)
                 if ti.static(self.solver.has_bonds):
                     self.solver.bonds.begin(b, slots[0] >> 2, slots[1] >> 2, motion.branch)
             else:
                 # Booked for the step before: it was full, though a unit fails now.
-                self.bonds.book_drag(b, found.dragged * (self.tables.unit_area[b] * dt))
-                self.bonds.release(b, motion, found)
+                self.bonds.book_drag(b, answer.dragged * (self.tables.unit_area[b] * dt))
+                self.bonds.release(b, motion, answer)
                 if ti.static(self.solver.has_bonds):
                     self.solver.bonds.end(b)
 

@@ -60,7 +60,7 @@ class Waking(Places):
                     self.sleeping.left_out[b] = self._left_out_now(b, moved)
 
     @ti.func
-    def sort(self, one):
+    def sort(self, item):
         """Renew the bound of sleep; bring bodies woken of late into the order of the others."""
         if self.sleeping.is_due():
             self.sleeping.renew_bound()
@@ -70,7 +70,7 @@ class Waking(Places):
                 self.lists.bonds.listing.sort()
 
     @ti.func
-    def begin(self, one):
+    def begin(self, item):
         """At the start bonds that sleep act once."""
         self.sleeping.starting[None] = 1
 
@@ -92,6 +92,6 @@ class Waking(Places):
             self.sleeping.awaken(self.store.body[p][side])
 
     @ti.func
-    def end_search(self, one):
+    def end_search(self, item):
         """The bodies woken by a search are listed."""
         self.sleeping.woken_count[None] = 0

@@ -61,11 +61,11 @@ class Accumulator:
         return result
 
     @ti.func
-    def distance_to_wall(self, travelled, kind, way, width):
+    def distance_to_wall(self, travelled, kind, direction, width):
         """Distance travelled [m] of a particle ahead of a wall that pushes its cell along."""
         result = 0.0
         if ti.static(self.reading == "signed"):
-            if self.lattice.upward(kind) * way == 1.0:
+            if self.lattice.upward(kind) * direction == 1.0:
                 result = max(travelled - width, -width)
         return result
 
@@ -152,51 +152,51 @@ class PaperTransport(OnCells):
     @ti.func
     def follow(self, s, step, motion):
         """Follow the container's staircase; returns what pushes give it [quanta]."""
-        way = self.cells.step_along(s, step, motion, self.parameters.width[s])
+        direction = self.cells.step_along(s, step, motion, self.parameters.width[s])
         impulse = ti.cast(0, ti.i64)
-        if way != 0:
-            self.mark(s, way)
+        if direction != 0:
+            self.mark(s, direction)
             for k in range(self.cells.traversal.begin(s), self.cells.traversal.end(s)):
                 cell = self.cells.traversal.cell(s, k)
                 if self.pushed[s, cell] == 1 and self.cells.at(s, cell) != HELD:
-                    impulse += self.push(s, cell, way, motion.v)
-            self.shift(s, way)
+                    impulse += self.push(s, cell, direction, motion.v)
+            self.shift(s, direction)
             self.cells.traversal.sort(s, self.cells)
         return impulse
 
     @ti.func
-    def mark(self, s, way):
+    def mark(self, s, course):
         """Mark the particles that touch the wall behind and all that hang together with them."""
         number, size = 0, self.lattice.size[s]
         for cell in range(size.cells + 1):
             self.pushed[s, cell] = ti.cast(0, ti.i8)
         for column in range(size.columns):
-            number = self.reach(s, self.lattice.cell_from(s, column, 0, way), way, number)
+            number = self.reach(s, self.lattice.cell_from(s, column, 0, course), course, number)
         while number > 0:
             number -= 1
             cell = ti.cast(self.border[s, number], ti.i32)
             for direction in range(DIRECTIONS):
-                number = self.reach(s, self.lattice.cell_ahead(s, cell, direction), way, number)
+                number = self.reach(s, self.lattice.cell_ahead(s, cell, direction), course, number)
 
     @ti.func
-    def reach(self, s, cell, way, number):
+    def reach(self, s, cell, direction, number):
         """Mark a particle unless it is, and put it on the border; returns the border's new size."""
         # The floor pushes through the heap that it holds; the ceiling pushes against no heap.
         result = number
         kind = self.cells.at(s, cell)
-        found = kind < DIRECTIONS or (kind == HELD and way > 0)
-        if found and self.pushed[s, cell] == 0:
+        is_free = kind < DIRECTIONS or (kind == HELD and direction > 0)
+        if is_free and self.pushed[s, cell] == 0:
             self.pushed[s, cell] = ti.cast(1, ti.i8)
             self.border[s, number] = ti.cast(cell, ti.i16)
             result = number + 1
         return result
 
     @ti.func
-    def push(self, s, cell, way, velocity):
+    def push(self, s, cell, direction, velocity):
         """Push one particle along; returns its counted gain of velocity along x [quanta]."""
         kind = self.cells.at(s, cell)
         gain = velocity - self.cells.vertical_speed(s, cell)
-        if gain * way > 0.0:
+        if gain * direction > 0.0:
             self.event_counts.note(s, PUSHES)
             kind = UP if velocity > 0.0 else DOWN
             travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
@@ -204,15 +204,15 @@ class PaperTransport(OnCells):
         else:
             gain = 0.0
             self.cells.travelled[s, cell] = self.accumulator.distance_to_wall(
-                self.cells.travelled[s, cell], kind, way, self.parameters.width[s]
+                self.cells.travelled[s, cell], kind, direction, self.parameters.width[s]
             )
         return self.accounting.push(s, gain)
 
     @ti.func
-    def shift(self, s, way):
+    def shift(self, s, direction):
         """Keep all others in place in the room: one cell the other way, those in front first."""
         for column in range(self.lattice.size.columns[s]):
             for k in range(self.lattice.size.rows[s]):
-                cell = self.lattice.cell_from(s, column, k, way)
+                cell = self.lattice.cell_from(s, column, k, direction)
                 if self.cells.at(s, cell) < DIRECTIONS and self.pushed[s, cell] == 0:
-                    self.cells.relocate(s, cell, cell - way, self.cells.travelled[s, cell])
+                    self.cells.relocate(s, cell, cell - direction, self.cells.travelled[s, cell])

@@ -146,9 +146,9 @@ class Collisions(OnCells):
     def approach(self, s, cell):
         """Velocity of a grain seen from the container at the time of the blow [m/s]."""
         later = self.cells.speed[s, cell] - self.cells.container[s]
-        found = later + self.cells.closing[s] * self.since(s, cell)
+        gap = later + self.cells.closing[s] * self.since(s, cell)
         # A grain that only just reaches the wall does not part from it backwards.
-        return found if found * later > 0.0 else 0.0
+        return gap if gap * later > 0.0 else 0.0
 
     @ti.func
     def rebound(self, s, cell, after):

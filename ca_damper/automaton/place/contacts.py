@@ -170,8 +170,8 @@ class GrainContacts(OnCells):
         result = count
         velocity = self.cells.across[s, cell]
         if velocity != 0.0:
-            way = 1 if velocity > 0.0 else -1
-            if self.lattice.in_side_wall(s, cell + way * self.lattice.size.height[s]):
+            side = 1 if velocity > 0.0 else -1
+            if self.lattice.in_side_wall(s, cell + side * self.lattice.size.height[s]):
                 share = ti.abs(velocity) * self.table.dt[s] / self.parameters.width[s]
                 if unit(bits(shared, cell, SIDE)) < share:
                     result = self.note(s, step, count, cell, _AT_SIDE, cell, 0, BRUSH)
@@ -228,13 +228,13 @@ class GrainContacts(OnCells):
     def meets(self, s, shared, cell, other, rows, steep):
         """Whether two grains of neighbouring columns touch in this step, by chance."""
         width, result = self.parameters.width[s], False
-        way = self.cells.way(s, other) - self.cells.way(s, cell)
+        distance = self.cells.way(s, other) - self.cells.way(s, cell)
         # Most pairs are told apart without a division or a root.
-        if ti.abs(rows * width + way) < _NEAR * width:
+        if ti.abs(rows * width + distance) < _NEAR * width:
             relative = self.cells.velocity(s, cell) - self.cells.velocity(s, other)
             draw = unit(scrambled(bits(shared, cell, GLANCE) + ti.cast(other, ti.u32)))
             if draw < steep * (ti.abs(relative[0]) + ti.abs(relative[1])):
-                rise = rows + way / width
+                rise = rows + distance / width
                 result = self.touches(s, draw / self.table.dt[s], cell, other, relative, rise)
         return result
 
@@ -254,9 +254,9 @@ class GrainContacts(OnCells):
         return result
 
     @ti.func
-    def taken(self, s, cell, way):
+    def taken(self, s, cell, direction):
         """Width [diameters] that the grain beside this one takes, on the left (way -1) or right."""
-        result, base = 1.0, self.lattice.column_beside(s, cell, way)
+        result, base = 1.0, self.lattice.column_beside(s, cell, direction)
         if not self.lattice.in_side_wall(s, base):
             result, width = 0.0, self.parameters.width[s]
             own = self.cells.height(s, cell) / width

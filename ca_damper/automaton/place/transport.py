@@ -30,17 +30,17 @@ class Transport(OnCells):
         """Number the cells anew when the lattice steps; no grain moves in the room."""
         # A grain whose new cell is taken keeps its cell and stands farther off its centre.
         width = self.parameters.width[s]
-        way = self.cells.step_along(s, step, motion, width)
-        if way != 0:
+        direction = self.cells.step_along(s, step, motion, width)
+        if direction != 0:
             for column in range(self.lattice.size.columns[s]):
                 for k in range(self.lattice.size.rows[s]):
-                    cell = self.lattice.cell_from(s, column, k, way)
+                    cell = self.lattice.cell_from(s, column, k, direction)
                     if self.cells.at(s, cell) == UP:
                         travelled = self.cells.travelled[s, cell]
-                        if self.cells.at(s, cell - way) == EMPTY:
-                            self.cells.relocate(s, cell, cell - way, travelled)
+                        if self.cells.at(s, cell - direction) == EMPTY:
+                            self.cells.relocate(s, cell, cell - direction, travelled)
                         else:
-                            self.cells.travelled[s, cell] = travelled - width * way
+                            self.cells.travelled[s, cell] = travelled - width * direction
             self.traversal.sort(s, self.cells)
         return ti.cast(0, ti.i64)
 
@@ -73,9 +73,9 @@ class Transport(OnCells):
         # one body.
         result, sideways = 0.0, self.parameters.sideways[s]
         across, pull = self.cells.across[s, cell], ti.abs(sideways)
-        way = 1 if sideways > 0.0 else -1
-        slow = across * way >= 0.0 and across * across < 2.0 * pull * self.parameters.width[s]
-        if slow and self.free_place(s, cell, way) == _NOWHERE:
+        direction = 1 if sideways > 0.0 else -1
+        slow = across * direction >= 0.0 and across * across < 2.0 * pull * self.parameters.width[s]
+        if slow and self.free_place(s, cell, direction) == _NOWHERE:
             self.cells.across[s, cell] = 0.0
             push = pull * self.table.dt[s] + ti.abs(across)
             share = self.parameters.mass[s] * self.table.recoil[s] * self.table.particles[s]
@@ -128,10 +128,10 @@ class Transport(OnCells):
         return count + 1
 
     @ti.func
-    def free_place(self, s, cell, way):
+    def free_place(self, s, cell, direction):
         """Cell at a grain's height in the next column (way 1: right), if there is room."""
         width, result = self.parameters.width[s], _NOWHERE
-        base = self.lattice.column_beside(s, cell, way)
+        base = self.lattice.column_beside(s, cell, direction)
         if not self.lattice.in_side_wall(s, base):
             height = self.cells.height(s, cell)
             row = self.lattice.nearest_row(s, base, height / width)
@@ -164,5 +164,5 @@ class Transport(OnCells):
             cell, target = ti.cast(self.movers[s, k], ti.i32), ti.cast(self.targets[s, k], ti.i32)
             ranked = rank_in_phase(step, shared, _ALONG, cell, 0)
             if self.conflicts.holds(s, target, ranked):
-                way = width * (target - cell)
-                self.cells.relocate(s, cell, target, self.cells.travelled[s, cell] - way)
+                rise = width * (target - cell)
+                self.cells.relocate(s, cell, target, self.cells.travelled[s, cell] - rise)

@@ -64,9 +64,9 @@ class PaperDevice(LatticeDevice):
 
     def motion_of(self, s: int, kind: np.ndarray, travelled: np.ndarray, speed: np.ndarray) -> Any:
         """Places off the centres of cells, and velocities, along the direction of each particle."""
-        way = np.zeros((len(kind), 2))
-        way[kind < DIRECTIONS] = unit_vectors()[kind[kind < DIRECTIONS]]
-        return way * travelled[:, None], way * speed[:, None]
+        direction = np.zeros((len(kind), 2))
+        direction[kind < DIRECTIONS] = unit_vectors()[kind[kind < DIRECTIONS]]
+        return direction * travelled[:, None], direction * speed[:, None]
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ class Entry:
 
 def read_entries(path: str | Path) -> tuple[Entry, ...]:
     """Entries of a text file: "# part", "## name", and lines "field: text", indented to go on."""
-    part, found = "", []
+    part, entries = "", []
     for block in Path(path).read_text(encoding="utf-8").split("\n\n"):
         head, *lines = re.sub(r"\n  +", " ", block).strip().split("\n")
         if head.startswith("# "):
@@ -60,8 +60,8 @@ def read_entries(path: str | Path) -> tuple[Entry, ...]:
         elif head.startswith("## "):
             fields: Any = dict(line.split(": ", 1) for line in lines)
             words = {name: tuple(fields.get(name, "").split()) for name in ("pictures", "figures")}
-            found.append(Entry(name=head[3:], part=part, **{**fields, **words}))
-    return tuple(found)
+            entries.append(Entry(name=head[3:], part=part, **{**fields, **words}))
+    return tuple(entries)
 
 
 def entry_of(run: Callable) -> Entry | None:
@@ -77,8 +77,8 @@ def entry_of(run: Callable) -> Entry | None:
 
 def key_figures(figures: Mapping[str, Mapping], patterns: Sequence[str]) -> list[str]:
     """Names of the figures of summary.json to show first, those of a paper before others."""
-    compared = [name for name, one in figures.items() if one["paper"] is not None]
-    matching = [name for name in figures if any(fnmatchcase(name, one) for one in patterns)]
+    compared = [name for name, pattern in figures.items() if pattern["paper"] is not None]
+    matching = [name for name in figures if any(fnmatchcase(name, pattern) for pattern in patterns)]
     return list(dict.fromkeys([*compared, *matching]))[:MOST_FIGURES]
 
 

@@ -76,9 +76,9 @@ def interval(text: str) -> dict:
 
 
 def _interval(text):
-    found: Any = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim)?", text)
-    unit = _INTERVALS[found[2]]
-    return {unit: int(found[1]) if unit == "every_steps" else float(found[1])}
+    match: Any = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim)?", text)
+    unit = _INTERVALS[match[2]]
+    return {unit: int(match[1]) if unit == "every_steps" else float(match[1])}
 
 
 def _checked(kind, words, allowed):
@@ -117,31 +117,33 @@ def parser(
     **defaults: Any,
 ) -> Parser:
     """Parser with the options every experiment has; drivers: to choose from, where there are."""
-    made = bare_parser(name, description)
-    made.add_argument("--quick", action="store_true", help="a smaller job, in a folder of its own")
-    made.add_argument("--json", action="store_true", help="print summary.json and nothing else")
-    add_out(made, name if folder is None else folder)
-    made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
+    options = bare_parser(name, description)
+    options.add_argument(
+        "--quick", action="store_true", help="a smaller job, in a folder of its own"
+    )
+    options.add_argument("--json", action="store_true", help="print summary.json and nothing else")
+    add_out(options, name if folder is None else folder)
+    options.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
     if drivers:
-        made.add_argument("--driver", default=drivers[0], choices=drivers)
-    made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
-    made.settings = settings
+        options.add_argument("--driver", default=drivers[0], choices=drivers)
+    options.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
+    options.settings = settings
     for name, (_, _, *option) in settings.items():
         if option:
             kind, words = option
             words = words.replace("%", "%%")
-            made.add_argument(f"--{name.replace('_', '-')}", type=kind, help=words)
-    made.set_defaults(**defaults)
-    return made
+            options.add_argument(f"--{name.replace('_', '-')}", type=kind, help=words)
+    options.set_defaults(**defaults)
+    return options
 
 
 def bare_parser(name: str, description: str | None) -> Parser:
     """Parser of a script with the one option that every script has."""
     plain: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
-    made = Parser(prog=f"python experiments/{name}.py", description=description, **plain)
-    made.add_argument("--quiet", action="store_true", help="print nothing but errors")
-    made.add_argument("--verbose", action="store_true", help="print all figures of a run")
-    return made
+    options = Parser(prog=f"python experiments/{name}.py", description=description, **plain)
+    options.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    options.add_argument("--verbose", action="store_true", help="print all figures of a run")
+    return options
 
 
 def add_out(made: Parser, folder: str) -> None:

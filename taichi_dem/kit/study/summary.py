@@ -49,11 +49,13 @@ def finish(
     draw: Callable[[], None] | None = None,
 ) -> None:
     """Write summary.json; print its figures, and the pictures."""
-    made = {key: figure(*one) if isinstance(one, tuple) else one for key, one in figures.items()}
-    _write_summary(options, name, made, runs)
+    values = {
+        key: figure(*value) if isinstance(value, tuple) else value for key, value in figures.items()
+    }
+    _write_summary(options, name, values, runs)
     entry = getattr(options, "entry", None)
-    if made:
-        print_figures(made, entry)
+    if values:
+        print_figures(values, entry)
     if draw:
         with ProgressBar(name):
             draw()
@@ -87,8 +89,8 @@ def _seconds_of(options, runs):
     if isinstance(runs, tuple):
         return runs, []
     reports = list(runs)
-    seconds = [sum(getattr(one, f"{k}_seconds") for one in reports) for k in ("compile", "run")]
-    errors = (getattr(one, "known_error", "") for one in reports)
+    seconds = [sum(getattr(run, f"{k}_seconds") for run in reports) for k in ("compile", "run")]
+    errors = (getattr(run, "known_error", "") for run in reports)
     return seconds, list(dict.fromkeys(filter(None, errors)))
 
 
@@ -106,8 +108,8 @@ def add_to_summary(folder: str, **entries: Any) -> None:
 
 def versions() -> dict[str, str]:
     """Versions of what computes, and the commit, "unknown" where there is none."""
-    found = {"taichi": taichi_version(), "numpy": np.__version__, "taichi-dem": __version__}
-    return {**found, "python": platform.python_version(), "commit": commit()}
+    packages = {"taichi": taichi_version(), "numpy": np.__version__, "taichi-dem": __version__}
+    return {**packages, "python": platform.python_version(), "commit": commit()}
 
 
 def print_figures(figures: Mapping[str, dict], entry: Entry | None = None) -> None:
@@ -117,9 +119,9 @@ def print_figures(figures: Mapping[str, dict], entry: Entry | None = None) -> No
         shown = key_figures(figures, entry.figures) or shown[:MOST_FIGURES]
     header, rows = ["figure", "value", "unit", "paper"], []
     for name in shown:
-        one = figures[name]
-        paper = "" if one["paper"] is None else value_in_words(one["paper"])
-        rows.append([name, value_in_words(one["value"]), one["unit"], paper])
+        value = figures[name]
+        paper = "" if value["paper"] is None else value_in_words(value["paper"])
+        rows.append([name, value_in_words(value["value"]), value["unit"], paper])
     columns = 4 if any(row[3] for row in rows) else 3
     print_table([row[:columns] for row in rows], header[:columns])
     if len(shown) < len(figures):
@@ -136,14 +138,14 @@ def value_in_words(value: Any) -> str:
 def show_files(folder: str, since: float = 0.0, first: Sequence[str] = ()) -> None:
     """Print the paths of the pictures in a folder, and where everything else is."""
     names = set(os.listdir(folder)) - set(older_files(folder, since))
-    made = sorted(name for name in names if name.endswith(_PICTURES) and not name.startswith("."))
-    made.sort(key=lambda name: first.index(name) if name in first else len(first))
+    files = sorted(name for name in names if name.endswith(_PICTURES) and not name.startswith("."))
+    files.sort(key=lambda name: first.index(name) if name in first else len(first))
     print()
-    if made:
+    if files:
         show_heading("Pictures")
-        print(*(f"  {os.path.join(folder, name)}" for name in made[:_MOST]), sep="\n")
-    if len(made) > _MOST:
-        print(f"  and {len(made) - _MOST} more")
+        print(*(f"  {os.path.join(folder, name)}" for name in files[:_MOST]), sep="\n")
+    if len(files) > _MOST:
+        print(f"  and {len(files) - _MOST} more")
     print(f"Tables and all figures are in {folder}")
 
 
@@ -162,8 +164,7 @@ def write_accuracy(
     """Write accuracy.csv; rows: cells under these names, and the answer that they belong to."""
     header = [*names, "goal", "unit", "value", "error", "seconds", "reached"]
     cells = [
-        (*first, one.goal, one.unit, one.value, one.error, one.plan.seconds, one.reached)
-        for first, one in rows
+        (*first, a.goal, a.unit, a.value, a.error, a.plan.seconds, a.reached) for first, a in rows
     ]
     write_csv(os.path.join(folder, "accuracy.csv"), dict(zip(header, zip(*cells))))
 
@@ -206,15 +207,15 @@ class Table:
 
     def cells(self, rows: Iterable[Row]) -> tuple[list[str], list[list[str]]]:
         """Headers of the columns that have one, and their cells in words, a list a row."""
-        shown = [(key, one) for key, one in self.columns.items() if one.header]
-        cells = [[_cell(row[key], one.format) for key, one in shown] for row in rows]
-        return [one.header for _, one in shown], cells
+        shown = [(key, column) for key, column in self.columns.items() if column.header]
+        cells = [[_cell(row[key], column.format) for key, column in shown] for row in rows]
+        return [column.header for _, column in shown], cells
 
     def figures(
         self, row: Row, name: str = "{key}", paper: Mapping[str, Any] = {}
     ) -> dict[str, dict]:
         """Figures of a row, of the columns that have a unit."""
-        units = {key: one.unit for key, one in self.columns.items() if one.unit}
+        units = {key: column.unit for key, column in self.columns.items() if column.unit}
         return {
             name.format(key=key, **row): figure(row[key], unit, paper.get(key))
             for key, unit in units.items()

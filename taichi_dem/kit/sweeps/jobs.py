@@ -48,9 +48,9 @@ class Job(NamedTuple):
 def identity_of(work: Any) -> str:
     """Name of a function as file:name; InputError unless other processes can import it."""
     module, name = (str(getattr(work, key, "")) for key in ("__module__", "__qualname__"))
-    found = sys.modules.get(module)
-    file = getattr(found, "__file__", None)
-    if getattr(found, name, None) is not work or not file or not os.path.isfile(file):
+    loaded = sys.modules.get(module)
+    file = getattr(loaded, "__file__", None)
+    if getattr(loaded, name, None) is not work or not file or not os.path.isfile(file):
         raise InputError(
             "function must be defined at the top of a file, where other processes can import it, "
             f"got {name or shown(work)}"
@@ -117,10 +117,10 @@ def table_of(jobs: Sequence[Job], records: Sequence[Record], given: Sequence[str
     columns.setdefault(SEED, [job.row[SEED] for job in jobs])
     for name in ADDED[1:]:
         columns[name] = [getattr(record, name) for record in records]
-    made = data_frame(columns)
+    table = data_frame(columns)
     # A row that failed has no text.
-    texts = [name for name in made if any(isinstance(value, str) for value in columns[name])]
-    return made.fillna(dict.fromkeys(texts, ""))
+    texts = [name for name in table if any(isinstance(value, str) for value in columns[name])]
+    return table.fillna(dict.fromkeys(texts, ""))
 
 
 def _checked_values(values, row):
@@ -153,12 +153,12 @@ class Journal:
 
     def read(self, jobs: Iterable[Job]) -> dict[str, Record]:
         """Records of those jobs that are finished, by digest; damaged files do not count."""
-        found = {}
+        records = {}
         for job in jobs if self.folder else ():
             with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
                 with open(self._path(job), encoding="utf-8") as file:
-                    found[job.digest] = Record(**json.load(file))
-        return found
+                    records[job.digest] = Record(**json.load(file))
+        return records
 
     def write(self, job: Job, record: Record) -> None:
         """Keep the record of a job that is final. Raises InputError where there is no space."""

@@ -109,11 +109,11 @@ def sweep(
     for job, record in _watched(ended, len(missing), progress):
         records[job.digest] = record
         journal.write(job, record)
-    made = table_of(jobs, [records[job.digest] for job in jobs], list(rows[0]))
+    frame = table_of(jobs, [records[job.digest] for job in jobs], list(rows[0]))
     if journal.folder:
-        with carrying(made):
-            write_csv(os.path.join(journal.folder, RESULTS), arrays_of(made))
-    return made
+        with carrying(frame):
+            write_csv(os.path.join(journal.folder, RESULTS), arrays_of(frame))
+    return frame
 
 
 def _watched(ended, count, progress) -> Iterator[tuple[Job, Record]]:
@@ -171,7 +171,10 @@ def _here(count: int):
         distributed.Client(cluster) as client,
     ):
         yield client
-        wait = [client.submit(runtime.stop, workers=[one], pure=False) for one in client.nthreads()]
+        wait = [
+            client.submit(runtime.stop, workers=[worker], pure=False)
+            for worker in client.nthreads()
+        ]
         with contextlib.suppress(TimeoutError):
             distributed.wait(wait, timeout=_NO_WORKER)
 

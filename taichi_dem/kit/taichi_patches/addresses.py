@@ -128,15 +128,15 @@ def _offset(node):
 
 def _address(field):
     """Address of the first entry of a field of one dimension."""
-    found = np.zeros(1, dtype=np.uint64)
+    address = np.zeros(1, dtype=np.uint64)
 
     @ti.kernel
-    def ask(found: ti.types.ndarray(dtype=ti.u64, ndim=1)):
+    def ask(address: ti.types.ndarray(dtype=ti.u64, ndim=1)):
         for _ in range(1):
-            found[0] = ti.get_addr(field, 0)
+            address[0] = ti.get_addr(field, 0)
 
-    ask(found)
-    return int(found[0])
+    ask(address)
+    return int(address[0])
 
 
 def _array_at(address, kind, shape, strides):

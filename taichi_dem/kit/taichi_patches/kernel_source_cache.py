@@ -75,7 +75,9 @@ def inside_class(level_of_class_stackframe: int) -> bool:
     except ValueError:
         return False
     line = linecache.getline(frame.f_code.co_filename, frame.f_lineno, frame.f_globals).strip()
-    return any(one.match(line) for one in named(f"{_KERNELS}._KERNEL_CLASS_STACKFRAME_STMT_RES"))
+    return any(
+        pattern.match(line) for pattern in named(f"{_KERNELS}._KERNEL_CLASS_STACKFRAME_STMT_RES")
+    )
 
 
 class BoundKernel:
@@ -122,6 +124,6 @@ _REPLACED: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
 
 def remember() -> None:
     """Install all of it."""
-    for place, name, made in _REPLACED if are_on() else ():
+    for place, name, replacement in _REPLACED if are_on() else ():
         owner = named(place)
-        setattr(owner, name, made(getattr(owner, name)))
+        setattr(owner, name, replacement(getattr(owner, name)))

@@ -32,18 +32,18 @@ def switch_off() -> None:
     path = getattr(sys.modules.get(_LIBRARY), "__file__", None)
     if path is None or sys.platform != "linux" or not are_on():
         return
-    found = addresses(path, (_PARSE, _KNOWN))
-    if len(found) < 2:
+    places = addresses(path, (_PARSE, _KNOWN))
+    if len(places) < 2:
         return
     known = ctypes.cast(ctypes.CDLL(path)[_KNOWN.decode()], ctypes.c_void_p).value or 0
     parse = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p, ctypes.c_char_p)
     words = (ctypes.c_char_p * (1 + len(_OPTIONS)))(b"taichi", *_OPTIONS)
-    parse(known + found[_PARSE] - found[_KNOWN])(len(words), words, None)
+    parse(known + places[_PARSE] - places[_KNOWN])(len(words), words, None)
 
 
 def addresses(path: str, names: Sequence[bytes]) -> dict[bytes, int]:
     """Addresses in a 64-bit ELF file of those of some names that its table of symbols has."""
-    found: dict[bytes, int] = {}
+    places: dict[bytes, int] = {}
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         sections = _sections(data)
         for kind, start, size, linked in sections:
@@ -53,8 +53,8 @@ def addresses(path: str, names: Sequence[bytes]) -> dict[bytes, int]:
                 for name in names:
                     place = data.find(b"\0" + name + b"\0", texts, texts + room) + 1 - texts
                     for value in symbols["value"][symbols["name"] == place]:
-                        found[name] = int(value)
-    return found
+                        places[name] = int(value)
+    return places
 
 
 def _sections(data):

@@ -60,12 +60,12 @@ def prepared(kernel: Any, templates: Sequence[Any], values: Sequence[Any]) -> Pr
     """A kernel that was called with these templates and values."""
     own, program = kernel._primal, impl.get_runtime().prog
     owner = [kernel._kernel_owner] if hasattr(kernel, "_kernel_owner") else []
-    found = own.compiled_kernels[own.ensure_compiled(*owner, *templates, *values)]
-    compiled = program.compile_kernel(program.config(), program.get_device_caps(), found)
-    kinds = [one.annotation for one in own.arguments[-len(values) :]] if values else []
+    kernel_code = own.compiled_kernels[own.ensure_compiled(*owner, *templates, *values)]
+    compiled = program.compile_kernel(program.config(), program.get_device_caps(), kernel_code)
+    kinds = [argument.annotation for argument in own.arguments[-len(values) :]] if values else []
     inner = [getattr(getattr(kind, "dtype", None), "ndim", 0) for kind in kinds]
     returns = own.return_type is not None
-    return PreparedLaunch(program, compiled, found.make_launch_context, inner, returns)
+    return PreparedLaunch(program, compiled, kernel_code.make_launch_context, inner, returns)
 
 
 def _failed(error):

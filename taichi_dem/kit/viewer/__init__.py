@@ -96,8 +96,8 @@ def _is_on_desktop() -> bool:
 
 def pack(values: Any, kind: str) -> dict[str, Any]:
     """Pack an array for a page: kind, and data, its bytes in C order, little-endian, in base64."""
-    made = np.ascontiguousarray(values, dtype=np.dtype(kind).newbyteorder("<"))
-    return {"kind": kind, "data": base64.b64encode(made.tobytes()).decode("ascii")}
+    packed = np.ascontiguousarray(values, dtype=np.dtype(kind).newbyteorder("<"))
+    return {"kind": kind, "data": base64.b64encode(packed.tobytes()).decode("ascii")}
 
 
 def quantise(frames: Sequence[np.ndarray]) -> dict[str, Any]:

@@ -129,7 +129,7 @@ class PairDashpots(ContactForces):
         return bit
 
     @ti.func
-    def _colour_rest(self, one):
+    def _colour_rest(self, item):
         """Colour what the rounds have left, one after the other."""
         for c in range(self.colouring.chunks.count(0)):
             if self.colouring.counts[self.colouring.at(c, LEFT)] > 0:
@@ -197,8 +197,8 @@ class PairDashpots(ContactForces):
                 if ti.static(self.springs.present):
                     self.pull[end] = vec3(0.0)
                     if depth > 0.0:
-                        way = self._way(i, j, branch, arm, normal, elapsed)
-                        self.springs.follow(k, rotation, normal, way)
+                        travel = self._way(i, j, branch, arm, normal, elapsed)
+                        self.springs.follow(k, rotation, normal, travel)
                         self.pull[end] = dt * self.springs.force(m, k, rotation)
                 end += 1
             else:
@@ -282,15 +282,15 @@ class PairDashpots(ContactForces):
         for c in range(start, start + self.touching[p]):
             k, along = self.entry[c], self.given[c][2]
             linear, angular = self.velocities.apart(pair[0], pair[1], self.branch[p])
-            found = self._answer(m, c, linear, angular)
-            step = self.impulse[k] - found
-            self.impulse[k] = found
+            answer = self._answer(m, c, linear, angular)
+            step = self.impulse[k] - answer
+            self.impulse[k] = answer
             self.velocities.pull(pair[0], pair[1], self.branch[p], step, self._moment(c, step))
             change2 = ti.max(change2, along * along * squared(step))
         raise_to(self.velocities.change2, change2)
 
     @ti.func
-    def visit_last(self, one):
+    def visit_last(self, item):
         """Visit the pairs of other colours and of none, one after the other."""
         for a in range(self.colour_first[WIDE], self.colour_first[LEFT]):
             self.visit(a)
@@ -305,17 +305,17 @@ class PairDashpots(ContactForces):
         rate = along + self._turned(c, angular)
         # The opening rate without this contact's own impulse, and the law solved for the impulse.
         free = rate - giving * pressed
-        found = ti.max(0.0, (push - damping * free) / (1.0 + damping * giving)) * normal
+        answer = ti.max(0.0, (push - damping * free) / (1.0 + damping * giving)) * normal
         if ti.static(self.has_friction):
             slide = velocity - along * normal - across * (held - pressed * normal)
-            bound = self.friction.limit(m, dot(found, normal))
+            bound = self.friction.limit(m, dot(answer, normal))
             stick = -damping / (1.0 + damping * across)
             if ti.static(self.springs.present):
                 pull = cut_to(self.pull[c], bound)
-                found += add_within(pull, stick * (slide + across * pull), bound)
+                answer += add_within(pull, stick * (slide + across * pull), bound)
             else:
-                found += cut_to(stick * slide, bound)
-        return found
+                answer += cut_to(stick * slide, bound)
+        return answer
 
     @ti.func
     def book_sweeps(self, p):
@@ -371,6 +371,6 @@ class PairDashpots(ContactForces):
         k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation(i)
         dt = self.schedule.step_seconds[0]
         bound = self.friction.limit(m, pressed) / dt
-        way = self._way(i, j, self.branch[p], self.arm[c], normal, self.elapsed[p])
-        spent = self.springs.slip(m, k, rotation, bound, way)
+        travel = self._way(i, j, self.branch[p], self.arm[c], normal, self.elapsed[p])
+        spent = self.springs.slip(m, k, rotation, bound, travel)
         return dt * self.springs.force(m, k, rotation), spent

@@ -40,7 +40,7 @@ class Solver:
             self.bonds.upload(model, method)
 
     @ti.func
-    def begin(self, one):
+    def begin(self, item):
         """Reset the residual and the count of sweeps; the spare body is at rest."""
         self.sweeps[None] = 0
         self.unsolved[None] = 1
@@ -48,7 +48,7 @@ class Solver:
         self.velocities.twist[self.velocities.spare] = vec6(0.0)
 
     @ti.func
-    def check_convergence(self, one):
+    def check_convergence(self, item):
         """End a sweep, and decide whether another one is required."""
         self.sweeps[None] = self.sweeps[None] + 1
         self.total_sweeps[None] = self.total_sweeps[None] + 1

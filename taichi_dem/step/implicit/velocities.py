@@ -53,11 +53,11 @@ class Velocities:
     @ti.func
     def mobility(self, i, j, branch):
         """Twist of body j against i per wrench between them at j's centre, a ``Block``."""
-        found = mobility(self.slack(i), self.turn[i], self.slack(j), self.turn[j], branch)
+        total = mobility(self.slack(i), self.turn[i], self.slack(j), self.turn[j], branch)
         if ti.static(self.couples):
             more = coupled_mobility(self.coupling[i], self.coupling[j], branch)
-            found = plus(found, more)
-        return found
+            total = plus(total, more)
+        return total
 
     @ti.func
     def coupled(self, i, velocity, spin, force, moment):

@@ -91,13 +91,13 @@ class ActiveLists:
 
     def filling(self, *lists: ActiveList) -> Phases:
         """Phases that list all members of some lists anew, or of all lists."""
-        return side_by_side(*(one.listing.phases for one in lists or self.all))
+        return side_by_side(*(active.listing.phases for active in lists or self.all))
 
     def reordering(self, move: Any, end: Any, *before: Any) -> Phases:
         """Phases that bring changed members to their places, after phases before."""
         if backend.is_cpu() or self.uniform:
             return ((Once(), move),)
-        due = tuple((OnlyIf(self._has_changed, one), item) for one, item in self.filling())
+        due = tuple((OnlyIf(self._has_changed, phase), item) for phase, item in self.filling())
         return (*before, *due, (Once(), end))
 
     @ti.func

@@ -43,7 +43,7 @@ class Schedule(Clock):
         getattr(self.criterion, "upload", lambda *_: None)(method.distance, method.dt0)
 
     @ti.func
-    def advance_clock(self, one):
+    def advance_clock(self, item):
         """Move the clock to the next tick at which a body is active."""
         if ti.static(self.has_contact):
             pairs = self.lists.pairs
@@ -110,18 +110,18 @@ class Schedule(Clock):
         return self.lists.filling(*((self.lists.pairs,) if self.uniform else ()))
 
     @ti.func
-    def forget(self, one):
+    def forget(self, item):
         """Empty the list of bodies whose rates have been updated."""
         self.limits.listed_count[None] = 0
 
     @ti.func
-    def reorder(self, one):
+    def reorder(self, item):
         """Move the entries of changed bodies, and count the evaluations of this tick."""
         self.rearrange(0)
         self._count_tick()
 
     @ti.func
-    def end_reordering(self, one):
+    def end_reordering(self, item):
         """The same where all members have been listed."""
         self.end_listing(0)
         self._count_tick()
@@ -136,7 +136,7 @@ class Schedule(Clock):
         self.evaluations[5] = self.evaluations[5] + bonds.count(low)
 
     @ti.func
-    def rearrange(self, one):
+    def rearrange(self, item):
         """Move the entries of changed bodies."""
         if ti.static(self.uniform):
             self.level_all(0)
@@ -155,7 +155,7 @@ class Schedule(Clock):
         self.level_limit.spread(self.lists.changed[a])
 
     @ti.func
-    def end_listing(self, one):
+    def end_listing(self, item):
         """All members are listed: none has changed or been woken since."""
         self.lists.changed_count[None] = 0
         if ti.static(self.sleeps):
@@ -163,7 +163,7 @@ class Schedule(Clock):
         self._find_finest()
 
     @ti.func
-    def level_all(self, one):
+    def level_all(self, item):
         """Set every body to the finest level that any of them wants."""
         if self.wanted[None] != self.state.level[0]:
             for i in range(self.tables.body_count[None]):
