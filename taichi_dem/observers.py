@@ -350,6 +350,23 @@ class Receivers:
         }
 
 
+def peak_velocities(
+    receivers: Mapping[str, Received], source: np.ndarray, charge: float
+) -> dict[str, np.ndarray]:
+    """Columns of ``Result.peak_velocities``."""
+    away = np.linalg.norm([np.subtract(r.point, source) for r in receivers.values()], axis=1)
+    order = np.argsort(away, kind="stable")
+    speed = [np.linalg.norm(receiver.velocity, axis=1).max() for receiver in receivers.values()]
+    parts = np.array([np.abs(receiver.velocity).max(axis=0) for receiver in receivers.values()])
+    return {
+        "receiver": np.array(list(receivers))[order],
+        "distance_m": away[order],
+        "scaled_distance_m_kg05": away[order] / np.sqrt(charge),
+        "peak_m_s": np.array(speed)[order],
+        **{f"peak_{axis}_m_s": parts[order, k] for k, axis in enumerate("xyz")},
+    }
+
+
 def write_receivers(path: FileName, receivers: Mapping[str, Received]) -> None:
     """Write a CSV row for each receiver and time; InputError when it cannot be written."""
     names = [np.full(len(receiver.time_s), name) for name, receiver in receivers.items()]

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MethodType, SimpleNamespace
@@ -14,16 +14,17 @@ from taichi_dem.kit.data_table import arrays_of, data_frame
 from taichi_dem.kit.display import Pictured, counted, embedded, in_brief, titled, verbatim
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
-from taichi_dem.kit.validation import FileName, whole
+from taichi_dem.kit.validation import FileName, direction, fraction, positive, whole
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.observers import Received, write_receivers
+from taichi_dem.observers import Received, peak_velocities, write_receivers
 from taichi_dem.output.fracture import (
     apertures_of,
     cracks_of,
     fragment_of_body,
     fragments_of,
+    passing_mass,
     rose_of,
 )
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of, watched_groups
@@ -39,7 +40,7 @@ from taichi_dem.state.model import Model
 class Result:
     """Result of a run.
 
-    A notebook shows its history, the block in the last frame, and the report.
+    A notebook shows the block in the last frame, its history, and the report.
 
     Parameters
     ----------
@@ -88,10 +89,11 @@ class Result:
         return in_brief(self, self.report.outcome, samples, frames, early)
 
     def _repr_html_(self):
-        drawn = {"What happened over time": self.plot.history()}
+        drawn = {}
         if self.frames:
             picture = self.plot.cracks if self.report.broken_faces else self.plot.block
             drawn["The block"] = picture()
+        drawn["What happened over time"] = self.plot.history()
         title = f"Result: {counted(self.model.body_count, 'body')}, {self.report.outcome}"
         shown = [embedded(figure._repr_png_(), words) for words, figure in drawn.items()]
         return titled(title, *shown, verbatim(self.report.details()), warning=self.diverged)
@@ -155,6 +157,46 @@ class Result:
         """
         of_body = self.fragment_of_body(frame)
         return data_frame(fragments_of(self.model, self.frame(frame), of_body))
+
+    def sieve_size(self, share: float = 0.8, frame: int = -1) -> float:
+        """Opening of the sieve that a share of the mass passes [m]: P80, or P50 with 0.5.
+
+        Parameters
+        ----------
+        share : float
+            Share of the mass, from 0 to 1.
+        frame : int
+            Number of the frame, the last by default.
+
+        Returns
+        -------
+        float
+            The smallest ``sieve_m`` of the fragments that at least this share passes.
+        """
+        fraction("share", share)
+        sizes, passing = passing_mass(arrays_of(self.fragments(frame)))
+        return float(sizes[np.searchsorted(passing, share * (1.0 - 1e-12))])
+
+    def peak_velocities(self, source: Sequence[float], charge: float = 1.0) -> Any:
+        """Tabulate the largest velocities at the receivers of the run, as for a blast report.
+
+        Parameters
+        ----------
+        source : sequence of float
+            Place of the charge [m], (3,).
+        charge : float
+            Mass of explosive that fires together [kg].
+
+        Returns
+        -------
+        pandas.DataFrame
+            Name, distance, scaled distance (distance over the root of the charge), largest speed
+            and components, a row a receiver, the nearest first.
+        """
+        if not self.receivers:
+            raise InputError("a result must have receivers for this: observers=[Receivers(points)]")
+        at = direction("source", source)
+        return data_frame(peak_velocities(self.receivers, np.array(at), positive("charge", charge)))
 
     def fragment_of_body(self, frame: int = -1) -> np.ndarray:
         """Fragment of each body (body_count,), a row of ``fragments(frame)``.

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ca_damper.report.certificate import Certificate, CheckedRange
-from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
+from taichi_dem.kit.display import BRIEF, Worded, counted, in_brief, in_lines
 from taichi_dem.kit.effect_table import EffectTable, EffectUse
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.validation import FileName, fraction, instance
@@ -15,7 +15,7 @@ RK45_STAGES = 6
 
 
 @dataclass(frozen=True)
-class Report:
+class Report(Worded):
     """Figures and cost of a batch since it was made.
 
     Parameters

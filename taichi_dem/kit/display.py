@@ -130,6 +130,14 @@ def verbatim(text: str) -> str:
     return f"<pre>{html.escape(text)}</pre>"
 
 
+class Worded:
+    """Base of what a notebook shows in words: all of ``details()`` where there are any."""
+
+    def _repr_html_(self) -> str:
+        details = getattr(self, "details", self.__str__)
+        return titled(type(self).__name__, verbatim(details()))
+
+
 class Pictured:
     """Base of what layers above draw, which set ``png``: the picture of such an object."""
 

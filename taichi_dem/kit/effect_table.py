@@ -8,6 +8,7 @@ from typing import Any
 from numpy import nan_to_num
 
 from taichi_dem.kit.data_table import data_frame
+from taichi_dem.kit.display import Worded
 
 NEGLIGIBLE, NEEDED, UNCLEAR = "negligible", "needed", "unclear"
 #: Grades of a certificate.
@@ -158,7 +159,7 @@ class EffectUse:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class EffectTable:
+class EffectTable(Worded):
     """Effects that a run needed, those that it did not need, and those that it lacked.
 
     Parameters

@@ -1,5 +1,6 @@
 """What broke, as tables: cracks by time, area and orientation, and fragments."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,13 @@ def fragments_of(model: Model, frame: Frame, of_body: np.ndarray) -> dict[str, n
         "sieve_m": _middle_edges(model, of_body, mass),
         **_motion(model, frame, of_body, mass),
     }
+
+
+def passing_mass(fragments: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes of sieves [m] in order, and the share of the mass that passes each."""
+    order = np.argsort(fragments["sieve_m"], kind="stable")
+    mass = np.cumsum(fragments["mass_kg"][order])
+    return fragments["sieve_m"][order], mass / mass[-1]
 
 
 def _motion(model, frame, of_body, mass):

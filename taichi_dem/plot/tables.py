@@ -12,7 +12,7 @@ from taichi_dem.kit.data_table import arrays_of, unit_of, without_unit
 from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
 from taichi_dem.kit.validation import FileName, choice, positive, unit_vector
-from taichi_dem.output.fracture import COLOURS, body_values, scale_end
+from taichi_dem.output.fracture import COLOURS, body_values, passing_mass, scale_end
 from taichi_dem.plot.view import ALONG_Z, JOINT, View, draw_bodies, frame_block
 
 #: Fragments of a colour of their own; lighter ones are grey.
@@ -72,9 +72,8 @@ def plot_fragments(result: Any, frame: int = -1, *, path: FileName | None = None
     """Draw the share of the mass that passes a sieve over its opening, in a frame."""
     # Shaded: sizes of single bodies, where the mesh decides and not the material.
     fragments = arrays_of(result.fragments(frame))
-    order = np.argsort(fragments["sieve_m"], kind="stable")
-    size, mass = 1e3 * fragments["sieve_m"][order], fragments["mass_kg"][order]
-    passing = 100.0 * np.cumsum(mass) / mass.sum()
+    sizes, shares = passing_mass(fragments)
+    size, passing = 1e3 * sizes, 100.0 * shares
     alone = 1e3 * fragments["sieve_m"][fragments["bodies"] == 1]
     with picture(path, size=(6.0, 4.0)) as (figure, axes):
         low, high = 0.7 * size[0], 1.4 * size[-1]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
+from taichi_dem.kit.display import BRIEF, Worded, counted, in_brief, in_lines
 from taichi_dem.kit.effect_table import EffectTable, EffectUse
 from taichi_dem.methods import order_of
 from taichi_dem.report.effects import Certificate
@@ -15,7 +15,7 @@ from taichi_dem.scene import Scene
 
 
 @dataclass(frozen=True)
-class Report:
+class Report(Worded):
     """Figures and cost of a run.
 
     Parameters

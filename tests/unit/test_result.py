@@ -6,6 +6,7 @@ the bodies that conserves mass, momentum and energy.
 
 import csv
 import dataclasses
+import html
 
 import meshio
 import numpy as np
@@ -147,6 +148,21 @@ def test_mass_momentum_and_energy_of_fragments_are_those_of_the_bodies(result, f
         assert flown.fragments(k)["kinetic_J"].sum() == pytest.approx(energy, rel=1e-12)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 0.8, 1.0])
+def test_a_sieve_lets_its_share_of_the_mass_pass_and_no_smaller_one_does(result, share):
+    found, size = result.fragments(), result.sieve_size(share)
+    mass, sieve = found["mass_kg"].to_numpy(), found["sieve_m"].to_numpy()
+    # To the rounding of the sums.
+    assert mass[sieve <= size].sum() >= (share - 1e-12) * mass.sum()
+    assert mass[sieve < size].sum() < (share + 1e-12) * mass.sum()
+
+
+def test_a_notebook_shows_the_block_first_and_reports_in_full(flown):
+    page = flown._repr_html_()
+    assert page.index("The block") < page.index("What happened over time")
+    assert html.escape(flown.report.details()) in flown.report._repr_html_()
+
+
 def test_pieces_of_a_turning_bar_have_its_motion(flown):
     """Its spin w, and V + w x r; no part of the energy is vibration. At the start, to rounding."""
     at_once = np.where(np.isnan(flown.broken_time), NAN, 0.0)
@@ -250,3 +266,17 @@ def test_points_of_a_turning_bar_move_on_their_circles():
         )
         assert not got.displacement[0].any()
         np.testing.assert_allclose(got.velocity[0], V + np.cross(W, arm), rtol=1e-12)
+    source, charge = (0.0, 0.0, 0.0), 4.0
+    peaks = result.peak_velocities(source, charge)
+    assert (
+        sorted(peaks["receiver"]) == sorted(POINTS) and peaks["distance_m"].is_monotonic_increasing
+    )
+    for row in peaks.itertuples():
+        away, velocity = (
+            np.linalg.norm(POINTS[row.receiver]),
+            result.receivers[row.receiver].velocity,
+        )
+        assert row.distance_m == pytest.approx(away, rel=1e-15)
+        assert row.scaled_distance_m_kg05 == pytest.approx(away / 2.0, rel=1e-15)
+        assert row.peak_m_s == np.sqrt((velocity**2).sum(axis=1)).max()
+        assert row.peak_y_m_s == abs(velocity[:, 1]).max()

@@ -10,7 +10,7 @@ import numpy as np
 
 from taichi_dem.kit.bars.budget import Source, table
 from taichi_dem.kit.bars.chance import mean_and_deviation, share_error, t_quantile
-from taichi_dem.kit.display import by_fields, counted
+from taichi_dem.kit.display import Worded, by_fields, counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, shown, word
 
@@ -182,7 +182,7 @@ class Branch:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Answer:
+class Answer(Worded):
     """Value of a goal with its error bar.
 
     Parameters
