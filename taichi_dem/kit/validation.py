@@ -2,10 +2,11 @@
 
 import dataclasses
 import decimal
+import difflib
 import math
 import numbers
 import os
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from typing import Any, TypeVar
 
 import numpy as np
@@ -144,8 +145,15 @@ def flag(name: str, value: Any) -> bool:
 def choice(name: str, value: Any, allowed: Collection[str]) -> str:
     """The value; InputError unless it is one of the words allowed."""
     if not isinstance(value, str) or value not in tuple(allowed):
-        raise InputError(f"{name} must be one of {', '.join(allowed)}, got {shown(value)}")
+        hint = did_you_mean(value, allowed)
+        raise InputError(f"{name} must be one of {', '.join(allowed)}, got {shown(value)}{hint}")
     return value
+
+
+def did_you_mean(value: object, allowed: Iterable[str]) -> str:
+    """A question after a wrong word, where one of the words allowed is close to it."""
+    close = difflib.get_close_matches(str(value), list(allowed), 1)
+    return f": did you mean {close[0]}?" if close else ""
 
 
 def word(name: str, value: Any) -> str:

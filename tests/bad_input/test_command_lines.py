@@ -57,3 +57,19 @@ def test_a_bad_line_ends_with_exit_code_2_and_writes_nothing(case, capsys, tmp_p
     said = capsys.readouterr().err
     assert code == 2 and said.endswith("\n") and said.count("\n") == 1
     assert os.listdir(tmp_path) == ["file"]
+
+
+@pytest.mark.parametrize(
+    "line, close",
+    [
+        ("--methdo fixed", "--method"),
+        ("--method fixd", "fixed"),
+        ("--xyzzy 1", None),
+        ("--method qq", None),
+    ],
+)
+def test_a_wrong_word_is_answered_with_the_one_it_resembles(line, close):
+    parser = importlib.import_module("blast_fracture").options_parser()
+    with pytest.raises(InputError) as refusal:
+        parser.parse_args(line.split())
+    assert str(refusal.value).partition("did you mean ")[2] == (f"{close}?" if close else "")

@@ -23,7 +23,7 @@ from taichi_dem.kit.files import older_files, output_folder
 from taichi_dem.kit.progress_bar import showing
 from taichi_dem.kit.study.entries import Entry, entry_of, show_opening
 from taichi_dem.kit.terminal import lasting_output
-from taichi_dem.kit.validation import shown
+from taichi_dem.kit.validation import did_you_mean, shown
 
 #: Name -> (full, quick), or (full, quick, type, help) for a setting that is an option too: value
 #: of the full job, of the quick job.
@@ -40,6 +40,11 @@ class Parser(ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Turn a wrong command line into an InputError."""
+        options = [option for action in self._actions for option in action.option_strings]
+        if wrong := re.search(r"unrecognized arguments: (\S+)", message):
+            message += did_you_mean(wrong[1], options)
+        elif wrong := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message):
+            message += did_you_mean(wrong[1], re.findall(r"\w+", wrong[2]))
         raise InputError(message)
 
 
