@@ -4,9 +4,12 @@ A notched plate is pulled apart slowly, with the paper's laws of bonds and with 
 The characteristic length E G / f_t^2 is a fifth of the way that the crack runs. A plane crack would
 spend G times the area of that plane. The slower the load, the less is spent beside the crack.
 
+A bar is stretched until it breaks everywhere. Into how many pieces is known for one law, and a row
+of masses and springs tells what any law gives without a mesh.
+
     python experiments/crack_energy.py --speed 0.005
 
-Writes energy.png, cracks.csv and summary.json to results/crack_energy/.
+Writes energy.png, cracks.csv, bars.csv and summary.json to results/crack_energy/.
 """
 
 import sys
@@ -17,6 +20,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from cases import stretched_bar
 from cases.trust.plates import comes_apart, material_of, notched, plate, pulled
 from taichi_dem import effects
 from taichi_dem.kit import study
@@ -29,6 +33,8 @@ SETTINGS = {
     "meshes": (2, 1, study.whole(1, 20), "random meshes of each size, default 2"),
     "sizes": (2, 1, study.whole(1, 3), "sizes of elements, coarse first, default 2"),
     "speed": (0.02, 0.02, study.number(1e-3, 1.0), "of both ends [m/s], default 0.02"),
+    "bars": (4, 2, study.whole(2, 100), "bars of each kind, default 4"),
+    "rates": (2, 1, study.whole(1, 2), "rates of strain of bars, default 2"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Length and width of the plate, and depth of the notch [m]; elements in a characteristic length.
@@ -43,6 +49,8 @@ LAWS = {
     "paper": lambda: [effects.Softening(), effects.ShearSlip()],
     "cohesive crack": lambda: [effects.CohesiveCrack()],
 }
+#: Rates of strain of bars [1/s].
+RATES = (1000.0, 100.0)
 #: What counts as agreement of the energy.
 LOW, HIGH = 0.95, 1.08
 TABLE = study.Table(
@@ -64,7 +72,8 @@ def parted(law, elements, seed, speed):
     options = {"tensile_strength": STRENGTH, "fracture_energy": ENERGY, "density": 2450.0}
     more = {"friction_angle": 30.0, "cohesion": COHESION * STRENGTH, "damping_ratio": 0.1}
     material = material_of(mesh, YOUNG, 0.2, **options, **more)
-    simulation = pulled(mesh, material, [*LAWS[law](), effects.BondDamping()], speed, RAMP)
+    laws = [*LAWS[law](), effects.BondDamping()]
+    simulation = pulled(mesh, material, laws, speed, RAMP, unbonded=["notch"])
     looks, step = range(1, round(FAR / speed / LOOK) + 1), simulation.method.dt0
     comes_apart(simulation, (round(look * LOOK / step) for look in looks))
     made = {"law": law, "elements": elements, "seed": seed, "bodies": mesh.body_count}
@@ -107,7 +116,7 @@ def picture_energy(path, made):
 
 
 def run(options):
-    """Pull all plates apart, compare, picture."""
+    """Pull all plates apart, stretch bars, compare, picture."""
     at, made = study.output_paths(options.out), []
     runs = [*product(ELEMENTS[: options.sizes], LAWS, range(options.meshes))]
     with ProgressBar(NAME) as bar, warnings.catch_warnings():
@@ -120,7 +129,12 @@ def run(options):
     TABLE.show(rows)
     study.write_rows(at("cracks.csv"), rows)
     picture_energy(at("energy.png"), made)
-    figures = {}
+    laws, figures = [*LAWS["cohesive crack"](), effects.BondDamping()], {}
+    bars = [*stretched_bar.fragmented(RATES[: options.rates], laws, options.bars)]
+    stretched_bar.TABLE.show(bars)
+    study.write_rows(at("bars.csv"), bars)
+    for row in bars:
+        figures.update(stretched_bar.TABLE.figures(row, "bar_{name}_{rate:g}_{key}"))
     for law, n in product(LAWS, ELEMENTS[: options.sizes]):
         these = [one for one in made if (one.law, one.elements) == (law, n)]
         for value in ("energy", "beside"):

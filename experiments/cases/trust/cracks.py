@@ -61,7 +61,7 @@ def divided(edge, seed):
     options = {"density": DENSITY, "friction_angle": 30.0, **BONDS}
     material = material_of(mesh, YOUNG, POISSON, **options)
     laws = [effects.BondDamping(), effects.Softening()]
-    simulation = pulled(mesh, material, laws, SPEED, RAMP)
+    simulation = pulled(mesh, material, laws, SPEED, RAMP, unbonded=["notch"])
     time_s = 0.5 * OPEN * material.failure_opening / SPEED + RAMP
     every = round(time_s / simulation.method.dt0 / LOOKS)
     if comes_apart(simulation, range(every, (LOOKS + 1) * every, every)):

@@ -105,13 +105,16 @@ def notched(whole, length, depth):
     return with_cut(whole, "notch", (0.5 * length, 0, 0), (1, 0, 0), lambda x: x[:, 1] < depth)
 
 
-def pulled(mesh, material, laws, speed, ramp):
-    """Simulation of a notched plate whose ends move apart, at a speed [m/s] after a ramp [s]."""
+def pulled(mesh, material, laws, speed, ramp=0.0, **options):
+    """Simulation of a solid whose ends move apart, at a speed [m/s] after a ramp [s].
+
+    options: of the scene.
+    """
     drives = [
         effects.PrescribedMotion(group, (way * speed, 0, 0), ramp=ramp)
         for group, way in (("left", -1), ("right", 1))
     ]
-    scene = Scene(mesh, material, [*laws, *drives], unbonded=["notch"])
+    scene = Scene(mesh, material, [*laws, *drives], **options)
     return Simulation(scene, ImplicitDashpots(springs_step(scene)))
 
 
