@@ -115,7 +115,7 @@ class Batch(LoadedScenes):
         rtol: float = 1e-9,
         atol: float = 1e-12,
         effects: str = "listed",
-        excitation: Any = None,
+        excitation: object = None,
         recorded_samples: int = 0,
         structure: ModalMount | None = None,
         if_diverged: str = "nan",
@@ -174,7 +174,9 @@ class Batch(LoadedScenes):
         """Steps of all scenes in all runs."""
         return self.launches.scene_steps
 
-    def start(self, start: str = "rest", *, displacement: Any = 0.0, velocity: Any = 0.0) -> None:
+    def start(
+        self, start: str = "rest", *, displacement: object = 0.0, velocity: object = 0.0
+    ) -> None:
         """Place the particles at their start, at time zero, where the base passes zero upwards.
 
         Parameters
@@ -208,7 +210,7 @@ class Batch(LoadedScenes):
         self._check_divergence()
         self._warn_of_divergence()
 
-    def drive(self, frequency: Any) -> None:
+    def drive(self, frequency: object) -> None:
         """Continue at another frequency, at the end of a cycle.
 
         The base keeps its position and changes its speed.
@@ -266,7 +268,9 @@ class Batch(LoadedScenes):
         self.periods = periods_of(cycles)
         return cycles
 
-    def measure_each(self, cycles: Any, progress: Listener | None = None) -> tuple[np.ndarray, ...]:
+    def measure_each(
+        self, cycles: object, progress: Listener | None = None
+    ) -> tuple[np.ndarray, ...]:
         """Continue by a number of cycles for each scene, and measure all of them.
 
         Parameters
@@ -293,7 +297,7 @@ class Batch(LoadedScenes):
         record = self._read_cycles(int(counts.max()))
         return tuple(column[:count].copy() for column, count in zip(record, counts))
 
-    def advance(self, steps: Any, progress: Listener | None = None) -> None:
+    def advance(self, steps: object, progress: Listener | None = None) -> None:
         """Advance every scene by a number of steps without measuring.
 
         Parameters
@@ -464,7 +468,7 @@ class Batch(LoadedScenes):
         self,
         steps: np.ndarray,
         before_measuring: np.ndarray,
-        progress: Any,
+        progress: object,
         every: int = 0,
         late: int = 0,
     ) -> None:

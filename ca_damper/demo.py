@@ -148,7 +148,7 @@ def _decay(counts: Sequence[int], batch: Batch, title: str) -> Decay:
     return Decay(counts, np.sqrt(2.0) * cycles.rms_by_cycle, batch.time_series()["x"].T)
 
 
-def _filmed(filling: Any, options: Namespace) -> Film:
+def _filmed(filling: object, options: Namespace) -> Film:
     batch = _batch(filling, options.particles, options.seed, options)
     steps = int(batch.steps_per_cycle[0])
     samples, frames = (max(1, steps // number) for number in (SAMPLES, FRAMES))

@@ -306,7 +306,7 @@ class DeviceFilling(Protocol):
         """Positions [m] from the lower left inner corner, velocities [m/s], (particles, 2) each."""
 
 
-def check_filling(filling: Any) -> Any:
+def check_filling(filling: object) -> Any:
     """Return the filling; InputError unless it has all members of the contract."""
     if isinstance(filling, type) or not isinstance(filling, Filling):
         raise InputError(

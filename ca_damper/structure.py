@@ -186,7 +186,7 @@ class ModalStructure:
             raise InputError(f"motion must have shape (..., {self.place_count}), got {moved.shape}")
         return moved @ self.masses @ self.shapes
 
-    def transfer(self, frequency: ArrayLike, added_masses: Any = None) -> np.ndarray:
+    def transfer(self, frequency: ArrayLike, added_masses: object = None) -> np.ndarray:
         """Complex ratio x / y [-] of all places in the steady state, shape (..., places).
 
         Parameters
@@ -257,7 +257,7 @@ class Box:
             check_filling(self.filling)
 
 
-def _array(name: str, value: Any, axes: int, least: float = -LARGEST) -> np.ndarray:
+def _array(name: str, value: object, axes: int, least: float = -LARGEST) -> np.ndarray:
     """Numbers with so many axes; InputError for others."""
     numbers = real_numbers(name, value, least)
     if numbers.ndim != axes or not numbers.size:
@@ -266,7 +266,7 @@ def _array(name: str, value: Any, axes: int, least: float = -LARGEST) -> np.ndar
     return numbers
 
 
-def _of_each(name: str, owner: str, value: Any, count: int, least: float) -> np.ndarray:
+def _of_each(name: str, owner: str, value: object, count: int, least: float) -> np.ndarray:
     """A number of each of so many owners, (count,), none below the least; InputError."""
     numbers = _array(name, value, 1, least)
     if len(numbers) != count:
@@ -275,7 +275,7 @@ def _of_each(name: str, owner: str, value: Any, count: int, least: float) -> np.
     return numbers
 
 
-def _mass_matrix(name: str, value: Any) -> np.ndarray:
+def _mass_matrix(name: str, value: object) -> np.ndarray:
     """Matrix of masses given as that or as its diagonal; InputError unless it is positive."""
     numbers = real_numbers(name, value)
     if len(np.atleast_1d(numbers)) > MOST_PLACES:

@@ -378,7 +378,7 @@ def write_receivers(path: FileName, receivers: Mapping[str, Received]) -> None:
     write_csv(path, columns)
 
 
-def checked_observers(observers: Any) -> Sequence[Any]:
+def checked_observers(observers: object) -> Sequence[Any]:
     """Observers as a tuple; InputError for one without a member, or with a wrong one."""
     if not isinstance(observers, (list, tuple)):
         raise InputError(f"observers must be a list of observers, got {shown(observers)}")

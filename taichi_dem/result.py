@@ -242,7 +242,7 @@ class Result:
         upto = np.searchsorted(cracks["time_s"], times_s, side="right")
         return data_frame({"time_s": times_s, "crack_area_m2": area[upto]})
 
-    def rose(self, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36) -> Any:
+    def rose(self, axis: object = (0.0, 0.0, 1.0), sectors: int = 36) -> Any:
         """Tabulate crack area by the direction of the cracks in a plane.
 
         Parameters

@@ -324,7 +324,7 @@ def _drags(scene, rough=False):
     return [contact.is_damped(law) for law in own if law.friction or not rough]
 
 
-def remedy(contact: Any) -> str:
+def remedy(contact: object) -> str:
     """How bodies touch at their outer faces; contact: the effect of a scene, None without."""
     return f"{type(contact).__name__ if contact else 'BodyContact'}(outer_faces=True)"
 
@@ -357,7 +357,7 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     )
 
 
-def initial_motion(mesh: Mesh, velocity: Any, spin: Any) -> dict[str, np.ndarray]:
+def initial_motion(mesh: Mesh, velocity: object, spin: object) -> dict[str, np.ndarray]:
     """Velocity and spin of every body at the start, as options of ``State.set_motion``."""
     centre = mesh.points[mesh.tetrahedra].mean(axis=1)
     moves, _ = _rows("velocity", velocity, mesh, centre)

@@ -1,7 +1,5 @@
 """Contents of the cells of every scene, which of them are visited, and how a scene begins."""
 
-from typing import Any
-
 import taichi as ti
 
 from ca_damper.automaton.conflict_resolution import ConflictResolution
@@ -71,7 +69,7 @@ class Cells:
     stair: displacement of the container in whole cells; offset: what is left of it [m].
     """
 
-    def __init__(self, lattice: Lattice, parameters: Any, listed: bool, follower: Any):
+    def __init__(self, lattice: Lattice, parameters: object, listed: bool, follower: object):
         table = lattice.table
         self.table, self.lattice, self.parameters = table, lattice, parameters
         self.traversal, self.follower = Traversal(lattice, listed), follower

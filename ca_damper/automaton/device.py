@@ -1,7 +1,5 @@
 """Base of all automata on the device, and the order in which rules act."""
 
-from typing import Any
-
 import numpy as np
 import taichi as ti
 
@@ -26,7 +24,7 @@ _COUNTED = {
 _BY = {name: (kind,) for name, (kind, _) in _COUNTED.items()}
 
 
-def parameters_of(automaton: Any) -> dict[str, float]:
+def parameters_of(automaton: object) -> dict[str, float]:
     """Numbers that kernels read, and those of the rules.
 
     gravity downwards and sideways, to the right [m/s^2]; restitution of particles and at walls;
@@ -55,14 +53,14 @@ class LatticeDevice:
 
     constant_fields = ("parameters",)
 
-    def __init__(self, automaton: Any, table: SceneFields, looks_ahead: bool):
+    def __init__(self, automaton: object, table: SceneFields, looks_ahead: bool):
         self.table, self.lattice = table, Lattice(table, looks_ahead)
         numbers = ti.types.struct(**dict.fromkeys(parameters_of(automaton), ti.f64))
         self.parameters = table.structs(numbers)
         self.event_counts = EventCounts(table, len(_BY), _BY)
         self.velocity, self.gained = table.field(ti.f64), table.field(ti.i64)
 
-    def fill(self, automaton: Any, cells: Cells, resting: Any, direction: int) -> None:
+    def fill(self, automaton: object, cells: Cells, resting: object, direction: int) -> None:
         """Add cells, what rests in them, and how they are filled."""
         self.cells, self.resting = cells, resting
         self.placement = Placement(cells, direction, automaton.start is not None)

@@ -87,7 +87,7 @@ class LatticeGeometry:
         return width * np.column_stack([column + 0.5, row + 0.5 + 0.5 * ((column + 1) % 2)])
 
 
-def geometry_of(options: Any) -> LatticeGeometry:
+def geometry_of(options: object) -> LatticeGeometry:
     """Geometry of the options of an automaton."""
     return LatticeGeometry(options.columns, options.rows)
 

@@ -4,8 +4,6 @@ The paper names its absence as the reason why the response peak moves the wrong 
 particles are carried until the container's acceleration falls below -g; then the heap lifts off.
 """
 
-from typing import Any
-
 import taichi as ti
 
 from ca_damper.automaton.cells import Cells, OnCells
@@ -16,7 +14,7 @@ from ca_damper.automaton.lattice import DOWN, HELD, UP, WALL
 class StaticContact(OnCells):
     """Particles held by the container; rests: whether any is ever held."""
 
-    def __init__(self, cells: Cells, accumulator: Any, rests: bool):
+    def __init__(self, cells: Cells, accumulator: object, rests: bool):
         super().__init__(cells)
         self.accumulator, self.rests = accumulator, rests
         self.held = self.table.field(ti.i32)

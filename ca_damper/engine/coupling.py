@@ -1,7 +1,6 @@
 """The step of a coupled scene, and the loop over all scenes: one thread a scene or group."""
 
 import math
-from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -72,9 +71,9 @@ class Coupling:
         table: SceneFields,
         clock: CycleClock,
         container: Container,
-        device: Any,
+        device: object,
         account: MomentumAccount,
-        recorder: Any,
+        recorder: object,
     ):
         self.table, self.clock, self.container, self.device = table, clock, container, device
         self.account, self.recorder = account, recorder

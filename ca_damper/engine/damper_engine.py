@@ -93,7 +93,7 @@ def borrow(
     kind: ExcitationKind,
     counts: tuple[int, int, int],
     more: dict[str, int],
-    owner: Any,
+    owner: object,
 ) -> DamperEngine:
     """An engine in which so many scenes of fillings find room, for an owner; or InputError."""
     structure, filling = fillings.structure, fillings.kinds[0]

@@ -239,7 +239,7 @@ class LoadedScenes:
 
 
 def divergence(
-    filling: Any, row: dict[str, Any], code: int, step: int, time_s: float
+    filling: object, row: dict[str, Any], code: int, step: int, time_s: float
 ) -> SimulationDiverged:
     """Exception for a scene, a row of the table, that diverged with a code by a step."""
     dt = row["dt"]

@@ -49,18 +49,18 @@ class BoxSize:
     by_cells: bool = False
 
     @classmethod
-    def of(cls, filling: Any) -> Any:
+    def of(cls, filling: object) -> Any:
         """Of an Automaton or Spheres."""
         rules = getattr(filling, "rules", None)
         by_cells = rules is not None and rules.by_cells
         return cls(*inner_size(filling), rules is not None, by_cells)
 
-    def lift(self, x: Any) -> Any:
+    def lift(self, x: object) -> Any:
         """Height of the box [m] when the container is displaced by x [m]."""
         cell = self.diameter
         return np.floor(np.asarray(x) / cell + 0.5) * cell if self.by_cells else np.asarray(x)
 
-    def floor_at(self, horizontal: Any) -> Any:
+    def floor_at(self, horizontal: object) -> Any:
         """Height of the floor [m] at places counted from the left wall [m]."""
         column = np.floor(np.asarray(horizontal) / self.diameter)
         return 0.5 * self.diameter * (self.staggered & (column % 2 == 0))

@@ -1,7 +1,5 @@
 """Checks of the input of a batch, before its kernels are compiled."""
 
-from typing import Any
-
 import numpy as np
 
 from ca_damper.excitation.excitation import Excitation, excitation_of
@@ -26,7 +24,9 @@ MOST_SCENES, MOST_SEED = 2**24, 2**31 - 1
 _ENOUGH = 8
 
 
-def check_run(transient_cycles: Any, measured_cycles: Any, start: Any, progress: Any) -> None:
+def check_run(
+    transient_cycles: object, measured_cycles: object, start: object, progress: object
+) -> None:
     """Raise InputError for an invalid number of cycles, start or progress."""
     whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
     whole("measured_cycles", measured_cycles, 1, 100_000)
@@ -34,7 +34,7 @@ def check_run(transient_cycles: Any, measured_cycles: Any, start: Any, progress:
     progress_option("progress", progress)
 
 
-def for_all(name: str, value: Any, scenes: int, most: int | None = None) -> np.ndarray:
+def for_all(name: str, value: object, scenes: int, most: int | None = None) -> np.ndarray:
     """One number for all scenes or one for each, (scenes,); InputError for anything else."""
     given = real_numbers(name, value)
     words = "numbers" if most is None else f"whole numbers from 0 to {most}"
@@ -44,7 +44,7 @@ def for_all(name: str, value: Any, scenes: int, most: int | None = None) -> np.n
     return np.broadcast_to(given, scenes)
 
 
-def checked_excitation(value: Any, mount: str) -> Excitation:
+def checked_excitation(value: object, mount: str) -> Excitation:
     """Excitation that a user means; InputError for a force on a container that the base moves."""
     excitation = excitation_of(value)
     if excitation.force is not None and mount == "base":
@@ -94,7 +94,7 @@ def sampling_found(excitation: Excitation, frequencies: np.ndarray) -> tuple[str
     return tuple(sentences)
 
 
-def run_seeds(seeds: Any) -> tuple[int, ...]:
+def run_seeds(seeds: object) -> tuple[int, ...]:
     """Seeds given as their number or one by one; InputError."""
     if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):
         seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)

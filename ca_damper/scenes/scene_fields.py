@@ -38,15 +38,15 @@ class SceneFields:
             setattr(self, name, self.field(kind))
         self.gravity, self.weight, self.recoil = (self.field(ti.f64) for _ in range(3))
 
-    def field(self, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
+    def field(self, dtype: object, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of the scenes; lengths: of its axes after that of the scenes."""
         return self._made(lambda shape: ti.field(dtype, shape=shape), lengths, flat)
 
-    def vector(self, n: int, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
+    def vector(self, n: int, dtype: object, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of vectors with n components; else as ``field``."""
         return self._made(lambda shape: ti.Vector.field(n, dtype, shape=shape), lengths, flat)
 
-    def structs(self, kind: Any, *lengths: int) -> ti.StructField:
+    def structs(self, kind: object, *lengths: int) -> ti.StructField:
         """Declare structs of given numbers; members lie apart, which kernels find faster."""
         # Given numbers are no state: a class lists them in its ``constant_fields``.
         return kind.field(shape=(self.capacity, *lengths), layout=ti.Layout.SOA)
@@ -89,7 +89,7 @@ class SceneFields:
 class SceneMemory:
     """State of a batch for checkpoints; arrays are cut to what its scenes use of the engine."""
 
-    def __init__(self, engine: Any, sizes: dict[str, int]):
+    def __init__(self, engine: object, sizes: dict[str, int]):
         self.engine, self.sizes = engine, sizes
 
     def read(self) -> dict[str, np.ndarray]:

@@ -1,7 +1,6 @@
 """Numbers of the scenes of a batch, checked against its filling, with steps that fit the cycle."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
 class SceneNumbers:
     """A table whose steps are shortened so that a whole number of them makes a cycle."""
 
-    def __init__(self, fillings: Any, table: SceneTable, has_box: np.ndarray):
+    def __init__(self, fillings: object, table: SceneTable, has_box: np.ndarray):
         self.fillings, self.table = fillings, table.copy()
         self.has_box = has_box
         self.largest_dt = self.table.column("dt")

@@ -54,14 +54,14 @@ class SceneTable:
 
     def __init__(
         self,
-        particles: Any,
-        seed: Any,
-        dt: Any,
-        frequency: Any = 6.0,
-        base_amplitude: Any = 0.0,
-        mass: Any = 0.086,
-        stiffness: Any = 123.4,
-        damping: Any = 0.08,
+        particles: object,
+        seed: object,
+        dt: object,
+        frequency: object = 6.0,
+        base_amplitude: object = 0.0,
+        mass: object = 0.086,
+        stiffness: object = 123.4,
+        damping: object = 0.08,
     ):
         values = (particles, seed, dt, frequency, base_amplitude, mass, stiffness, damping)
         columns = {name: _checked(name, value) for name, value in zip(self.COLUMNS, values)}
@@ -104,7 +104,7 @@ class SceneTable:
             )
         self._host = changed._host
 
-    def drive(self, frequency: Any, dt: Any) -> None:
+    def drive(self, frequency: object, dt: object) -> None:
         """Change frequency and step of all scenes.
 
         Parameters
@@ -144,7 +144,7 @@ def _kept(column: np.ndarray, count: int) -> np.ndarray:
     return kept
 
 
-def _checked(name: str, value: Any) -> np.ndarray:
+def _checked(name: str, value: object) -> np.ndarray:
     """One number or a sequence as an array (n,) of 64 bits; InputError for any out of range."""
     zero_allowed = name in _WHOLE + _MAY_BE_ZERO
     column = np.atleast_1d(real_numbers(name, value, 0.0 if zero_allowed else SMALLEST))

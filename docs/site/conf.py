@@ -45,6 +45,7 @@ CONTENTS = {
         "docs/results",
         "docs/units",
         "docs/gpu",
+        "docs/bench",
         "docs/limits",
     ],
     "How to add": ["docs/add_*"],

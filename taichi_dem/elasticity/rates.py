@@ -51,7 +51,7 @@ def bond_rates(
     topology: Topology,
     density: Density,
     coefficients: tuple[Constant, Constant],
-    multiply: Any = product,
+    multiply: object = product,
 ) -> np.ndarray:
     """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,)."""
     # G: sum of (A / 3) J^T diag(normal, tangential) J over the contact units of all bonds, with
@@ -65,7 +65,7 @@ def subset_rates(
     density: Density,
     coefficients: tuple[Constant, Constant],
     subsets: Sequence[int] = range(16),
-    multiply: Any = product,
+    multiply: object = product,
 ) -> np.ndarray:
     """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets))."""
     root, blocks = _roots_and_blocks(mesh, topology, density, coefficients, multiply)
@@ -111,7 +111,7 @@ def face_laws(
 
 
 def contact_eigenvalues(
-    mesh: Mesh, density: Density, divisions: int, friction: bool, multiply: Any = product
+    mesh: Mesh, density: Density, divisions: int, friction: bool, multiply: object = product
 ) -> np.ndarray:
     """Largest eigenvalue of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], (n,)."""
     mass, centre, inertia = body_properties(mesh, density)
@@ -149,7 +149,9 @@ def levers(arms: np.ndarray) -> np.ndarray:
     return matrices
 
 
-def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray, multiply: Any = product) -> np.ndarray:
+def scaled_eigenvalues(
+    root: np.ndarray, blocks: np.ndarray, multiply: object = product
+) -> np.ndarray:
     """Largest eigenvalue of root G root^T for every 6x6 block G, shape (n,)."""
     if multiply is not product:
         return np.linalg.eigvalsh(root @ blocks @ transposed(root))[:, -1]

@@ -124,7 +124,7 @@ class _Declared:
             impl._root_fb = self._root
             self._runtime.unfinalized_fields_builder = dict(self._trees)
 
-    def restore_fields(self, tree: Any = None) -> None:
+    def restore_fields(self, tree: object = None) -> None:
         """Forget the fields declared since, and a tree."""
         if impl.get_runtime() is self._runtime:
             self._runtime.unfinalized_fields_builder.pop(tree, None)

@@ -2,7 +2,6 @@
 
 import math
 from collections import Counter
-from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -143,7 +142,7 @@ def _rounds():
     return rounds_made if rounds_made < _ROUNDS else 0
 
 
-def declared_bytes(node: Any) -> int:
+def declared_bytes(node: object) -> int:
     """Bytes of all fields placed below a node that is not allocated yet."""
     return sum(_bytes_of(node.get_ch(k)) for k in range(node.get_num_ch()))
 
@@ -154,7 +153,7 @@ def _bytes_of(node):
     return math.prod(SNode(node).shape) * declared_bytes(node)
 
 
-def align(root: Any) -> None:
+def align(root: object) -> None:
     """Declare fillers in a tree so that each field of 8 bytes lies at a multiple of 8."""
     # Taichi's layout for Vulkan packs fields without gaps: after one of an odd number of words, a
     # number of 8 bytes would overwrite half of its neighbour (taichi issue 8803).

@@ -25,7 +25,7 @@ class Engine:
     #: What an owner is, in words.
     serves = "simulation"
 
-    def __init__(self, structure: Any, capacity: Iterable[int]):
+    def __init__(self, structure: object, capacity: Iterable[int]):
         self.structure, self.capacity = structure, tuple(capacity)
         self.session = runtime.session()
         self.owner: weakref.ref | None = None
@@ -51,7 +51,7 @@ class Engine:
         """Whether nobody uses it."""
         return self.owner is None or self.owner() is None
 
-    def check(self, owner: Any) -> None:
+    def check(self, owner: object) -> None:
         """Raise InputError where it serves another, its session has ended, or on another thread."""
         runtime.check_session(self.session, self.serves)
         if self.owner is None or self.owner() is not owner:
@@ -100,7 +100,7 @@ class EnginePool:
         runtime.when_cleared(self._forget)
         _pools.append(self)
 
-    def borrow(self, structure: Hashable, size: Sequence[int], scene: Any, owner: Any) -> Any:
+    def borrow(self, structure: Hashable, size: Sequence[int], scene: object, owner: object) -> Any:
         """An engine of a structure in which a scene of some size fits, for an owner's lifetime."""
         runtime.check_thread(self.kind.serves)
         self._forget_other_session()

@@ -42,7 +42,7 @@ class SimulationDiverged(Portable, RuntimeError):
 
 
 @contextlib.contextmanager
-def carrying(result: Any) -> Iterator[None]:
+def carrying(result: object) -> Iterator[None]:
     """What is raised in its block carries a result, so that it is not lost with it."""
     try:
         yield
@@ -51,7 +51,7 @@ def carrying(result: Any) -> Iterator[None]:
         raise
 
 
-def carry(error: Exception, result: Any) -> None:
+def carry(error: Exception, result: object) -> None:
     """Have an exception carry a result as ``result``, unless its class has another use for that."""
     with contextlib.suppress(AttributeError):
         error.result = result  # type: ignore[attr-defined]

@@ -16,7 +16,7 @@ from taichi_dem.kit.types import mat3, real, vec3, vec6
 _AXES = range(3)
 
 
-def once(value: Any) -> Any:
+def once(value: object) -> Any:
     """A value that is evaluated here, where it is used more than once; in Python itself."""
     return impl.expr_init(value) if impl.inside_kernel() else value
 

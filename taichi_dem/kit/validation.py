@@ -72,13 +72,13 @@ def plain_fields(owner: Any) -> None:
         object.__setattr__(owner, field.name, plain(getattr(owner, field.name)))
 
 
-def is_real(value: Any) -> bool:
+def is_real(value: object) -> bool:
     """Whether a value is a real number: no truth value, and no duration, which has a unit."""
     # NumPy says of a duration that it is a whole number.
     return isinstance(value, numbers.Real) and not isinstance(value, (bool, np.timedelta64))
 
 
-def is_whole(value: Any) -> bool:
+def is_whole(value: object) -> bool:
     """Whether a value is a whole number."""
     return isinstance(value, numbers.Integral) and is_real(value)
 
@@ -135,14 +135,14 @@ def whole(name: str, value: Any, least: int, most: int) -> int:
     return int(value)
 
 
-def flag(name: str, value: Any) -> bool:
+def flag(name: str, value: object) -> bool:
     """The value; InputError unless it is True or False."""
     if not isinstance(value, bool):
         raise InputError(f"{name} must be True or False, got {shown(value)}")
     return value
 
 
-def choice(name: str, value: Any, allowed: Collection[str]) -> str:
+def choice(name: str, value: object, allowed: Collection[str]) -> str:
     """The value; InputError unless it is one of the words allowed."""
     if not isinstance(value, str) or value not in tuple(allowed):
         hint = did_you_mean(value, allowed)
@@ -156,7 +156,7 @@ def did_you_mean(value: object, allowed: Iterable[str]) -> str:
     return f": did you mean {close[0]}?" if close else ""
 
 
-def word(name: str, value: Any) -> str:
+def word(name: str, value: object) -> str:
     """The value; InputError unless it is text that a mesh file can hold as a name."""
     if not isinstance(value, str) or not value or not value.isprintable() or '"' in value:
         raise InputError(
@@ -166,7 +166,7 @@ def word(name: str, value: Any) -> str:
     return value
 
 
-def instance(name: str, value: Any, kind: type | tuple[type, ...]) -> Any:
+def instance(name: str, value: object, kind: type | tuple[type, ...]) -> Any:
     """The value; InputError unless it is an object of a class, or of one of several."""
     kinds = kind if isinstance(kind, tuple) else (kind,)
     if not isinstance(value, kinds):
@@ -176,14 +176,14 @@ def instance(name: str, value: Any, kind: type | tuple[type, ...]) -> Any:
     return value
 
 
-def progress_option(name: str, value: Any) -> Any:
+def progress_option(name: str, value: object) -> Any:
     """The value; InputError unless it is a function, "auto" (a bar where watched) or None."""
     if value is None or callable(value) or (isinstance(value, str) and value == AUTO):
         return value
     raise InputError(f'{name} must be a function, "{AUTO}" or None, got {shown(value)}')
 
 
-def path_name(name: str, value: Any) -> str:
+def path_name(name: str, value: object) -> str:
     """The value as text, a leading "~" as the user's home; InputError unless it can name a file."""
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else ""
     if not isinstance(text, str) or not text or "\0" in text:
@@ -192,7 +192,7 @@ def path_name(name: str, value: Any) -> str:
     return os.path.expanduser(str.__str__(text))
 
 
-def file_stem(name: str, value: Any) -> str:
+def file_stem(name: str, value: object) -> str:
     """The value; InputError unless it is a name for files of one folder, without their ending."""
     text = str.__str__(value) if isinstance(value, str) else ""
     if not text.isprintable() or not text.strip() or text[0] == "." or {*text} & {*"/\\:"}:
@@ -227,7 +227,7 @@ def direction(name: str, value: Any) -> tuple[float, ...]:
     return tuple(float(x) for x in three)
 
 
-def unit_vector(name: str, value: Any) -> np.ndarray:
+def unit_vector(name: str, value: object) -> np.ndarray:
     """The direction of three finite numbers, (3,), of length one; InputError where all are zero."""
     vector = np.array(direction(name, value))
     if not length(vector) > 0.0:
@@ -235,7 +235,7 @@ def unit_vector(name: str, value: Any) -> np.ndarray:
     return vector / length(vector)
 
 
-def real_numbers(name: str, value: Any, least: float = -LARGEST) -> np.ndarray:
+def real_numbers(name: str, value: object, least: float = -LARGEST) -> np.ndarray:
     """A number or an array of any shape as floats; InputError unless all are from least to 1e60."""
     try:
         given = np.asarray(value)

@@ -64,7 +64,7 @@ def _middle_of(model, group):
     return np.array([middle, middle + axes[:, 2]] if long >= _SLENDER * wide else [middle])
 
 
-def check_alone(effect: Any, given: Any, model: Model) -> None:
+def check_alone(effect: object, given: object, model: Model) -> None:
     """Raise InputError where a support that turns shares a body with another support.
 
     given: attributes of the effect of the scene, by which it is known among those of the model.

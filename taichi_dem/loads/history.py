@@ -17,7 +17,7 @@ from taichi_dem.state.model import names_of
 MOST_POINTS = 4096
 
 
-def history_points(times: Any, values: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def history_points(times: object, values: object) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Times [s] and values as tuples of floats."""
     t, v = (np.atleast_1d(real_numbers(*named)) for named in (("times", times), ("values", values)))
     if t.ndim != 1 or not 1 <= len(t) <= MOST_POINTS:

@@ -130,7 +130,7 @@ class Pressure(FacePressure):
         Times [s], ascending.
     """
 
-    def __init__(self, group: str, values: Any, times: Any = (0.0,)):
+    def __init__(self, group: str, values: object, times: object = (0.0,)):
         self.group = word("group", group)
         self.times, self.values = history_points(times, values)
         in_unit("largest of values", max(self.values, key=abs), PRESSURE)

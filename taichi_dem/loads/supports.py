@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -61,7 +60,7 @@ class _Support(Support):
 class _TurningSupport(_Support):
     """A support that may hold its bodies at points alone, about which they turn."""
 
-    def __init__(self, group: str, turns: bool, about: Any):
+    def __init__(self, group: str, turns: bool, about: object):
         super().__init__(group)
         self.turns = flag("turns", turns)
         self.about = checked_hinge(turns, about)
@@ -115,7 +114,9 @@ class Roller(_TurningSupport):
         nearest point of the line. None: the middle line of the group, of a short one the middle.
     """
 
-    def __init__(self, group: str, normal: Sequence[float], turns: bool = False, about: Any = None):
+    def __init__(
+        self, group: str, normal: Sequence[float], turns: bool = False, about: object = None
+    ):
         super().__init__(group, turns, about)
         self._normal = unit_vector("normal", normal)
 
@@ -203,9 +204,9 @@ class PrescribedMotion(_TurningSupport):
         velocity: Sequence[float],
         frequency: float = 0.0,
         ramp: float = 0.0,
-        history: Any = None,
+        history: object = None,
         turns: bool = False,
-        about: Any = None,
+        about: object = None,
     ):
         super().__init__(group, turns, about)
         self._velocity = direction("velocity", velocity)

@@ -18,7 +18,7 @@ from taichi_dem.materials import Material
 from taichi_dem.state.model import Model
 
 
-def checked_stress(name: str, value: Any) -> tuple[float, ...]:
+def checked_stress(name: str, value: object) -> tuple[float, ...]:
     """Six components of a stress [Pa]: xx, yy, zz, xy, yz, zx."""
     given = [*value] if isinstance(value, (list, tuple, np.ndarray)) else []
     if len(given) != 6 or not all(finite(component) for component in given):

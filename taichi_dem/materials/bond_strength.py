@@ -1,7 +1,6 @@
 """Strength of each bond of a scene over that of its material (NumPy only)."""
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.topology import topology_of
 
 
-def given_strength(mesh: Mesh, given: Any) -> np.ndarray:
+def given_strength(mesh: Mesh, given: object) -> np.ndarray:
     """Factors that a scene asks for, an array (bond_count,) or a function of middles of faces."""
     top = topology_of(mesh)
     middle = mesh.points[top.vertices].mean(axis=1)
@@ -27,7 +26,7 @@ def given_strength(mesh: Mesh, given: Any) -> np.ndarray:
     return strength
 
 
-def bond_strength(laid: BodyMaterials, given: Any, seed: int) -> np.ndarray | None:
+def bond_strength(laid: BodyMaterials, given: object, seed: int) -> np.ndarray | None:
     """Strength of each bond over that of its material, (bond_count,); None where all have 1."""
     factor = None if given is None else given_strength(laid.mesh, given)
     if any(material.strength_spread for material in laid.materials):

@@ -74,7 +74,7 @@ class View:
         return seen[np.argsort(depth, kind="stable")]
 
 
-def surface(topology: Topology, view: View, corners: np.ndarray, broken: Any) -> Any:
+def surface(topology: Topology, view: View, corners: np.ndarray, broken: object) -> Any:
     """Visible polygons (n, 3, 2) [m] from back to front, their bodies, which are crack faces."""
     body, face, crack = skin(topology, broken)
     triangles = corners[body[:, None], LOCAL_FACES[face]]

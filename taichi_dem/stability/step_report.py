@@ -190,7 +190,7 @@ def step_limits(
 
 
 def bond_steps(
-    mesh: Mesh, material: AnyMaterial, multiply: Any = product, damped: bool = True
+    mesh: Mesh, material: AnyMaterial, multiply: object = product, damped: bool = True
 ) -> dict[str, np.ndarray]:
     """Largest steps [s] that the springs and the dashpots of the bonds of each body allow."""
     of_bonds = mesh, topology_of(mesh), material.density

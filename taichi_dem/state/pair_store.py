@@ -1,7 +1,5 @@
 """The pair store: everything that belongs to a near pair of bodies, in a slot of its own."""
 
-from typing import Any
-
 import numpy as np
 import taichi as ti
 
@@ -25,7 +23,7 @@ class Columns:
     def __len__(self):
         return len(self.members)
 
-    def declare(self, name: str, kind: Any, width: int = 0) -> ti.Field:
+    def declare(self, name: str, kind: object, width: int = 0) -> ti.Field:
         """Field of a new column; width: components, 0 for a number."""
         if name in self.by_name:
             raise InputError(f"a column of the pair store must have a new name, got {name!r}")
@@ -85,11 +83,11 @@ class PairStore:
         self.deepest = ti.field(real, shape=slots)
         self.free_count, self.used_end = (ti.field(ti.i32, shape=()) for _ in range(2))
 
-    def column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
+    def column(self, name: str, kind: object, width: int = 0) -> ti.Field:
         """Field with an entry a slot; kind: data type, width: components, 0 for a number."""
         return self.columns.declare(name, kind, width)
 
-    def sphere_column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
+    def sphere_column(self, name: str, kind: object, width: int = 0) -> ti.Field:
         """The same with an entry a sphere pair."""
         return self.sphere_columns.declare(name, kind, width)
 

@@ -118,7 +118,7 @@ class Tables:
         self._declare_bodies(capacity.bodies)
         self._declare_bonds(capacity)
 
-    def take(self, by_role: dict[str, list[Any]], bond: Any, geometry: Any) -> None:
+    def take(self, by_role: dict[str, list[Any]], bond: object, geometry: object) -> None:
         """Take the effects bound to the tables, by role, law of bonds and geometry of contact."""
         self.bond, self.geometry = bond, geometry
         self.dashpot, self.friction = by_role["dashpot"][0], by_role["friction"][0]

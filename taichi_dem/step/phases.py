@@ -37,7 +37,7 @@ class Absent:
 ABSENT: Any = Absent()
 
 
-def given(present: bool, part: Any) -> Any:
+def given(present: bool, part: object) -> Any:
     """A part where it is present, else ABSENT."""
     return part if present else ABSENT
 

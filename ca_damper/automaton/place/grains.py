@@ -1,7 +1,5 @@
 """Grains by the rules of place: under way with a velocity across the columns, or at rest."""
 
-from typing import Any
-
 import taichi as ti
 
 from ca_damper.automaton.cells import Cells
@@ -17,7 +15,7 @@ class GrainCells(Cells):
     blows. closing: acceleration of the container towards grains that fly [m/s^2].
     """
 
-    def __init__(self, lattice: Lattice, parameters: Any, listed: bool):
+    def __init__(self, lattice: Lattice, parameters: object, listed: bool):
         super().__init__(lattice, parameters, listed, self)
         table = self.table
         self.across = table.field(ti.f64, "cells")

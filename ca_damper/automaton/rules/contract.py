@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Hashable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ca_damper.automaton.device import LatticeDevice
 from ca_damper.report.certificate import CheckedRange, Driven
@@ -43,10 +43,10 @@ class Rules(ABC):
         return type(self), *(value for name, value in vars(self).items() if name not in numbers)
 
     @abstractmethod
-    def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
+    def known_range(self, automaton: object, driven: Driven) -> CheckedRange:
         """The range in which the rules were checked, and what of the scenes lies outside it."""
 
-    def range_of(self, automaton: Any, driven: Driven) -> CheckedRange:
+    def range_of(self, automaton: object, driven: Driven) -> CheckedRange:
         """Their own ``known_range``; a class that takes another's was compared with nothing."""
         if "known_range" in vars(type(self)):
             return self.known_range(automaton, driven)

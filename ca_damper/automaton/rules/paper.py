@@ -29,7 +29,7 @@ _CHECKED = (
 class PaperDevice(LatticeDevice):
     """Particles fly in six directions, at most a cell a step, and collide with what is ahead."""
 
-    def __init__(self, automaton: Any, table: SceneFields):
+    def __init__(self, automaton: object, table: SceneFields):
         super().__init__(automaton, table, looks_ahead=True)
         rules = automaton.rules
         accounting = Accounting(rules.accounting, self.lattice)
@@ -140,7 +140,7 @@ class Paper(Rules):
         """Without some of the impulses there is none."""
         return 1 if self.accounting == "all" else None
 
-    def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
+    def known_range(self, automaton: object, driven: Driven) -> CheckedRange:
         """The range, with a warning before a run outside of it."""
         outside = tuple(_beyond(automaton, driven))
         warning = (

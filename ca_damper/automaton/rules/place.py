@@ -30,7 +30,7 @@ _CHECKED = (
 class PlaceDevice(LatticeDevice):
     """Grains fly in any direction, and collide where their positions meet."""
 
-    def __init__(self, automaton: Any, table: SceneFields):
+    def __init__(self, automaton: object, table: SceneFields):
         super().__init__(automaton, table, looks_ahead=False)
         tilted = gravity_across(automaton) != 0.0
         grains = GrainCells(self.lattice, self.parameters, automaton.traversal == "list")
@@ -130,7 +130,7 @@ class Place(Rules):
         """Both coefficients."""
         return {"friction": self.friction, "wall_friction": self.wall_friction}
 
-    def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
+    def known_range(self, automaton: object, driven: Driven) -> CheckedRange:
         """The range, and what was not checked or is known to be off."""
         return CheckedRange(_CHECKED, tuple(_beyond(automaton, driven)))
 

@@ -32,7 +32,7 @@ Row = dict[str, Any]
 _PICTURES = (".png", ".svg", ".gif", ".mp4", ".html")
 
 
-def figure(value: Any, unit: str, paper: Any = None) -> dict:
+def figure(value: object, unit: str, paper: object = None) -> dict:
     """One figure of summary.json; what was not measured is left out instead."""
     if isinstance(value, float) and not math.isfinite(value):
         value = None
@@ -128,7 +128,7 @@ def print_figures(figures: Mapping[str, dict], entry: Entry | None = None) -> No
         print(f"and {len(figures) - len(shown)} more in summary.json")
 
 
-def value_in_words(value: Any) -> str:
+def value_in_words(value: object) -> str:
     """A figure's value: four digits, or "not found" where the run looked for one in vain."""
     if value is None or isinstance(value, str):
         return value or "not found"

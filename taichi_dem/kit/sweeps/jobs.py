@@ -45,7 +45,7 @@ class Job(NamedTuple):
     digest: str
 
 
-def identity_of(work: Any) -> str:
+def identity_of(work: object) -> str:
     """Name of a function as file:name; InputError unless other processes can import it."""
     module, name = (str(getattr(work, key, "")) for key in ("__module__", "__qualname__"))
     loaded = sys.modules.get(module)
@@ -60,7 +60,7 @@ def identity_of(work: Any) -> str:
     return f"{module}:{name}"
 
 
-def jobs_of(work: Any, rows: Sequence[Row], seed: int, version: str = "") -> list[Job]:
+def jobs_of(work: object, rows: Sequence[Row], seed: int, version: str = "") -> list[Job]:
     """A job for each row; one without a seed gets it from the sweep's and its number."""
     file: Any = sys.modules[work.__module__].__file__
     with open(file, encoding="utf-8") as source:

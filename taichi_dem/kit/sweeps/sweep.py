@@ -47,7 +47,7 @@ def sweep(
     table: TableLike,
     *,
     workers: int | None = None,
-    client: Any = None,
+    client: object = None,
     out: FileName | None = None,
     seed: int = 0,
     version: str = "",

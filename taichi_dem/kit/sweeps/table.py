@@ -56,7 +56,7 @@ def checked_rows(table: TableLike) -> list[Row]:
     ]
 
 
-def plain_value(name: str, value: Any) -> Value:
+def plain_value(name: str, value: object) -> Value:
     """A number or text as Python has it; InputError, which calls it by name, for anything else."""
     # A duration or date would become a number without its unit.
     if isinstance(value, np.generic) and value.dtype.kind in "biufU":

@@ -4,7 +4,6 @@ import ctypes
 import math
 import mmap
 import weakref
-from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -31,21 +30,21 @@ def lies_here() -> bool:
     return backend.is_cpu() and are_on()
 
 
-def remember(root: Any, anchor: ti.Field) -> None:
+def remember(root: object, anchor: ti.Field) -> None:
     """Find the address of a tree by one of its fields, of one dimension."""
     address = _address(anchor) - _offset(anchor.snode.ptr)[1]
     _forget_other_sessions()
     _bases[root.id] = address
 
 
-def forget(root: Any) -> None:
+def forget(root: object) -> None:
     """Let go of a tree, whose memory is about to be freed."""
     _bases.pop(root.id, None)
     for field in [field for field in _arrays if _layout(field)[0].id == root.id]:
         del _arrays[field]
 
 
-def clear(root: Any) -> None:
+def clear(root: object) -> None:
     """Set all bytes of a tree to zero."""
     memory = _array_at(_base(root), np.dtype(np.uint8), (root.cell_size_bytes,), (1,))
     first, end = _given_back(_base(root), memory)

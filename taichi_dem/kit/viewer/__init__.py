@@ -94,7 +94,7 @@ def _is_on_desktop() -> bool:
     return has_display or sys.platform in ("darwin", "win32")
 
 
-def pack(values: Any, kind: str) -> dict[str, Any]:
+def pack(values: object, kind: str) -> dict[str, Any]:
     """Pack an array for a page: kind, and data, its bytes in C order, little-endian, in base64."""
     packed = np.ascontiguousarray(values, dtype=np.dtype(kind).newbyteorder("<"))
     return {"kind": kind, "data": base64.b64encode(packed.tobytes()).decode("ascii")}
