@@ -134,6 +134,8 @@ function shares(place, rows) {
   });
 }
 
+const LIGHT = [-0.33, 0.52, 0.79];
+
 // A colour between black, itself and white: light from -1 to 1.
 function lit(hex, light) {
   const n = parseInt(hex.slice(1), 16), to = light > 0 ? 255 : 0, s = Math.abs(light);
@@ -141,7 +143,13 @@ function lit(hex, light) {
   return `rgb(${part(16)},${part(8)},${part(0)})`;
 }
 
-const LIGHT = [-0.33, 0.52, 0.79];
+// A colour between two of six digits.
+function mixed(from, to, share) {
+  const [a, b] = [from, to].map((one) => parseInt(one.slice(1), 16));
+  const part = (shift) => Math.round(((a >> shift) & 255) * (1 - share) + ((b >> shift) & 255) * share);
+  return `#${((1 << 24) | (part(16) << 16) | (part(8) << 8) | part(0)).toString(16).slice(1)}`;
+}
+
 // Draws the faces of a solid that show, the far ones first. view: turn (rows to the right, up and
 // towards the eye), middle [m], distance of the eye [m], scale [pixels / m] and place of the middle.
 // fill(i): colour of a body. Returns what is drawn: [face, six screen coordinates], the near last.
