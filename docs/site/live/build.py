@@ -72,8 +72,8 @@ def what_one_percent_costs():
     until = 6e-5
     most = until / limits["bond_dashpot"].min()
     steps = {
-        "explicit": [math.ceil(1.02 * most * 2.0 ** (k / 4.0)) for k in range(9)],
-        "solved": [round(30.0 * 2.0 ** (k / 2.0)) for k in range(9)],
+        "explicit": [math.ceil(1.02 * most * 2.0 ** (k / 8.0)) for k in range(9)],
+        "solved": [round(30.0 * 2.0 ** (0.375 * k)) for k in range(9)],
         "true": 1000,
     }
     right = mesh.points[:, 0].max() - 1e-6

@@ -119,6 +119,7 @@ class Solid {
     this.faces = new Int32Array(found.flatMap((b) => [b.master, b.slave]));
     for (const name of ["frame", "onMaster", "onSlave"]) this[name] = numbers(9);
     this.area = numbers(1);
+    this.strain = numbers(1);
     this.limit = numbers(3);
     this.slipped = numbers(6);
     this.broken = new Uint8Array(n);
@@ -142,7 +143,7 @@ class Solid {
   reset() {
     const m = this.material;
     this.x.set(this.centre);
-    for (const name of ["v", "L", "w", "S", "T", "slipped", "moved", "awake", "broken", "acted", "q", "R"]) this[name].fill(0);
+    for (const name of ["v", "L", "w", "S", "T", "slipped", "strain", "moved", "awake", "broken", "acted", "q", "R"]) this[name].fill(0);
     for (let i = 0; i < this.count; i++) {
       this.q[4 * i] = 1;
       for (const k of [0, 4, 8]) this.R[9 * i + k] = 1;
@@ -351,6 +352,7 @@ class Solid {
     }
     const area = this.area[b];
     this.drag += area * dt * dragged;
+    this.strain[b] = area * stored;
     this.heat.friction += area * rubbed;
     if (failed) return this.release(b, area * (stored - 0.5 * worked));
     this.pull(n, p, area * dt, f0, f1, f2, m0, m1, m2, d0, d1, d2);
@@ -400,6 +402,7 @@ class Solid {
 
   release(b, freed) {
     this.broken[b] = 1;
+    this.strain[b] = 0;
     this.brokenCount++;
     this.heat.cracks += freed;
     this.exposed.push(this.faces[2 * b], this.faces[2 * b + 1]);
@@ -635,7 +638,7 @@ class Solid {
     }
     const onset = m.tensile_strength / m.normal_stiffness, end = failureOpening(m);
     for (let b = 0; b < this.bonds; b++) {
-      if (!this.broken[b]) found.springs += this.storedIn(b);
+      found.springs += this.strain[b];
       for (let u = 3 * b; u < 3 * b + 3; u++) {
         const at = Math.min(this.limit[u], end);
         if (at > onset) found.cracks += 0.5 * this.area[b] * (m.tensile_strength * at - softened(m, at) * onset);
@@ -648,22 +651,6 @@ class Solid {
 
   late() {
     return this.theta ? 0.5 : -0.5;
-  }
-
-  // Elastic energy of a bond [J].
-  storedIn(b) {
-    const i = this.faces[2 * b] >> 2, j = this.faces[2 * b + 1] >> 2, m = this.material;
-    const axes = product(matrix(this.frame, b), transposed(matrix(this.R, i))), Rj = matrix(this.R, j);
-    const d = minus(row(this.x, j), row(this.x, i));
-    let sum = 0;
-    for (let k = 0; k < 3; k++) {
-      const arm = along(Rj, row(this.onSlave, 3 * b + k)), at = along(axes, [d[0] + arm[0], d[1] + arm[1], d[2] + arm[2]]);
-      const open = minus(at, row(this.onMaster, 3 * b + k)), limit = this.limit[3 * b + k];
-      const weak = this.effects.softening && open[0] > 0 && limit > m.tensile_strength / m.normal_stiffness;
-      const y = open[1] - this.slipped[6 * b + 2 * k], z = open[2] - this.slipped[6 * b + 2 * k + 1];
-      sum += (weak ? softened(m, limit) / limit : m.normal_stiffness) * open[0] ** 2 + m.shear_stiffness * (y * y + z * z);
-    }
-    return 0.5 * this.area[b] * sum;
   }
 }
 

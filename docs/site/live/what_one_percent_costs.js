@@ -133,7 +133,7 @@ for (const [name, { words, colour }] of Object.entries(METHODS)) {
 element("run").addEventListener("click", () => enqueue(method, +element("step").value));
 const fill = () => {
   remember({ fill: 1 });
-  for (const name of Object.keys(METHODS)) for (const number of [0, 2, 4, 6, 8]) enqueue(name, number);
+  for (const name of Object.keys(METHODS)) for (const number of [0, 3, 6, 8]) enqueue(name, number);
 };
 element("fill").addEventListener("click", fill);
 ask(Object.fromEntries(Object.entries(METHODS).map(([name, { words }]) => [name, words])), show);
