@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ca_damper import Batch, RigidMass, SceneTable, Spheres
-from docs.site.live.build import OUT, PAGES, built, source
+from docs.site.live.build import OUT, PAGES, SOLID, built, source
 from taichi_dem import ImplicitDashpots, Material, Scene, Simulation, Uniform, checked_mesh, effects
 from taichi_dem.mesh.topology import face_vertices, skin, topology_of
 from tests.ca_spheres.rig import put
@@ -78,7 +78,7 @@ def moved(run, data, velocity, options):
         const way = [...solid.x].map((place, k) => place - solid.centre[k]);
         JSON.stringify([way, [...solid.v], [...solid.broken], solid.near.length]);"""
     script = script.replace("INPUT", json.dumps([*arrays, data["material"], options]))
-    way, speed, broken, near = run(["solid.js"], script.replace("STEPS", str(STEPS)))
+    way, speed, broken, near = run(SOLID, script.replace("STEPS", str(STEPS)))
     return np.reshape(way, (-1, 3)), np.reshape(speed, (-1, 3)), np.array(broken), near
 
 
@@ -154,7 +154,7 @@ def boxed(filling, numbers, motion):
 
 def test_grains_shake_their_box_as_in_the_kernels(run):
     """Thrown at each other and at the walls; fixed ones move with their box."""
-    _, numbers, _ = PAGES["hear_the_grains"]()
+    scripts, numbers, _ = PAGES["hear_the_grains"]()
     places = 6.3e-3 * np.stack(np.mgrid[:9, :4], axis=-1).reshape(-1, 2) + 3.1e-3
     velocities = np.random.default_rng(1).uniform(-0.5, 0.5, places.shape)
     script = """
@@ -167,7 +167,7 @@ def test_grains_shake_their_box_as_in_the_kernels(run):
         JSON.stringify(found);"""
     given = json.dumps([numbers, places.ravel().tolist(), velocities.ravel().tolist()])
     script = script.replace("INPUT", given).replace("STEPS", str(STEPS))
-    free, speed, fixed, _ = run(["grains.js"], script)
+    free, speed, fixed, _ = run(scripts, script)
     of_free, batch = boxed(Spheres(), numbers, (places, velocities))
     of_grains = batch.snapshot(0)["velocity"]
     of_fixed, _ = boxed(RigidMass(), numbers, (places, velocities))

@@ -21,6 +21,8 @@ from taichi_dem.shapes import beam, plate
 
 HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "live"
+#: Scripts of bonded bodies, in their order.
+SOLID = ["vectors.js", "bodies.js", "contact.js", "solved.js", "solid.js"]
 #: Concrete of the paper, with dashpots that an explicit step of half a microsecond bears.
 BRISK = replace(dem.CONCRETE, normal_damping=1.13e6, shear_damping=5.05e5, contact_damping=3e3)
 
@@ -52,7 +54,7 @@ def strike_here():
     mesh = rounded(made, {"rim": ("left", "right", "bottom", "top")})
     numbers = {"dt": 5e-7, "sleep": 1e-3}
     words = {"bodies": mesh.body_count, "sleep": "a thousandth"}
-    return ["solid.js"], packed(mesh, BRISK, "rim") | numbers, words
+    return SOLID, packed(mesh, BRISK, "rim") | numbers, words
 
 
 def one_step_too_far():
@@ -63,7 +65,7 @@ def one_step_too_far():
     numbers = {"limit": float(f"{limit:.3g}"), "worst": worst, "other": other}
     words = {"worst": worst, "other": other, "limit": f"{1e9 * limit:.0f}"}
     words["springs"] = f"{1e9 * limits['bond_stiffness'].min():,.0f}"
-    return ["solid.js"], packed(mesh, dem.CONCRETE) | middle_of(mesh) | numbers, words
+    return SOLID, packed(mesh, dem.CONCRETE) | middle_of(mesh) | numbers, words
 
 
 def what_one_percent_costs():
@@ -79,7 +81,7 @@ def what_one_percent_costs():
     right = mesh.points[:, 0].max() - 1e-6
     end = np.flatnonzero((mesh.points[mesh.tetrahedra][:, :, 0] > right).any(axis=1))
     numbers = {"until": until, "steps": steps, "end": end.tolist()}
-    return ["solid.js"], packed(mesh, dem.CONCRETE) | numbers, {"until": round(1e6 * until)}
+    return SOLID, packed(mesh, dem.CONCRETE) | numbers, {"until": round(1e6 * until)}
 
 
 def hear_the_grains():

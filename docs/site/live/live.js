@@ -13,6 +13,13 @@ function unpack({ kind, data: text }) {
 const solidOf = (mesh, options) =>
   new Solid(Float64Array.from(unpack(mesh.points)), Int32Array.from(unpack(mesh.tetrahedra)), mesh.material, { held: mesh.held, ...options });
 
+// A push of the left end that fades along the bar, so that neighbours differ little.
+function pushOf(solid) {
+  const velocity = new Float64Array(3 * solid.count);
+  for (let i = 0; i < solid.count; i++) velocity[3 * i] = solid.centre[3 * i] < 0.2 ? Math.cos((Math.PI * solid.centre[3 * i]) / 0.4) ** 2 : 0;
+  return velocity;
+}
+
 // State of the page is in its address, so that a link shows what its sender saw.
 const address = new URLSearchParams(location.hash.slice(1));
 function remember(values) {

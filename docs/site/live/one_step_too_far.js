@@ -3,13 +3,6 @@ const bars = ["explicit", "solved"].map((name) => ({ name, canvas: element(name)
 const view = { turn: turnOf(-28, 22), middle: data.middle, distance: 1.6 };
 let share = 10 ** (+(address.get("step") || -15) / 200), time = 0;
 
-// A push of the left end that fades along the bar, so that neighbours differ little.
-function pushOf(solid) {
-  const velocity = new Float64Array(3 * solid.count);
-  for (let i = 0; i < solid.count; i++) velocity[3 * i] = solid.centre[3 * i] < 0.2 ? Math.cos((Math.PI * solid.centre[3 * i]) / 0.4) ** 2 : 0;
-  return velocity;
-}
-
 function renew() {
   time = 0;
   for (const bar of bars) {

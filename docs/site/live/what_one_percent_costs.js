@@ -30,12 +30,6 @@ function* running(theta, steps, tries = 2, more = {}) {
   return { way: data.end.reduce((sum, i) => sum + solid.x[3 * i] - solid.centre[3 * i], 0) / data.end.length, ms: least };
 }
 
-function pushOf(solid) {
-  const velocity = new Float64Array(3 * solid.count);
-  for (let i = 0; i < solid.count; i++) velocity[3 * i] = solid.centre[3 * i] < 0.2 ? Math.cos((Math.PI * solid.centre[3 * i]) / 0.4) ** 2 : 0;
-  return velocity;
-}
-
 // Works through the queue of runs, some milliseconds in a frame.
 const work = animation(() => {
   within_ms(12, Infinity, () => {
