@@ -121,6 +121,17 @@ def test_struck_plate_breaks_and_touches_as_in_the_kernels(run):
     assert (broken == 1).tolist() == expected.tolist()
 
 
+def test_what_sleeps_changes_places_by_less_than_its_share(run):
+    """Bodies wait for a wave to come, which leaves out a share of what it brings."""
+    _, data, _ = PAGES["strike_here"]()
+    velocity, awake = blow(data, 3.0, 0.1), {"dt": data["dt"], "held": data["held"]}
+    (way, *_), (slept, *_) = (
+        moved(run, data, velocity, {**awake, "sleep": share}) for share in (0.0, data["sleep"])
+    )
+    assert not way[data["held"]].any()
+    assert 0.0 < np.abs(slept - way).max() <= data["sleep"] * np.abs(way).max()
+
+
 #: Pages with a bar; method of the kernels, and where in the step their dashpots act.
 SWEPT = {"tolerance": 1e-12, "sweeps": (2, 1000)}
 WAYS = [

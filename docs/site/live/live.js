@@ -73,7 +73,7 @@ function animation(each) {
 }
 
 // Calls work() until it returns false, a number of times is done, or a time [ms] is over.
-function within_ms(most, count, work) {
+function workFor(most, count, work) {
   const end = performance.now() + most;
   for (let k = 0; k < count; k++) if (work() === false || performance.now() > end) return;
 }

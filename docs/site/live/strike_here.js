@@ -34,7 +34,7 @@ function strike(place, size) {
 // Slow at first, as the wave runs: each frame takes a share of the steps so far.
 const play = animation((frame) => {
   const wanted = Math.max(1, Math.round(0.03 * plate.steps));
-  within_ms(11, wanted, () => {
+  workFor(11, wanted, () => {
     plate.step();
     if (whole) whole.step();
   });

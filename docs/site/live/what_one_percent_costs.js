@@ -32,7 +32,7 @@ function* running(theta, steps, tries = 2, more = {}) {
 
 // Works through the queue of runs, some milliseconds in a frame.
 const work = animation(() => {
-  within_ms(12, Infinity, () => {
+  workFor(12, Infinity, () => {
     if (!queue.length) return false;
     const made = queue[0].run.next();
     if (!made.done) return true;
