@@ -54,6 +54,7 @@ const pitchOf = (box) => Math.sqrt(container.stiffness / box.mass) / (2 * Math.P
 // Sound: a tone for each box, and noise as strong as the blows.
 let audio = null;
 function listen() {
+  if (audio) audio.context.resume();
   if (audio || !element("sound").checked || !window.AudioContext) return;
   const context = new AudioContext(), to = (node) => {
     const gain = context.createGain();
