@@ -36,7 +36,7 @@ export HOME := $(CURDIR)/.venv/home
 endif
 
 .PHONY: help venv demo test test-all test-experiments test-slow test-forks test-gpu attack fuzz lint bench bench-others coverage \
-  gallery docs mesh wheel release-check clean
+  gallery docs live mesh wheel release-check clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-16s %s\n", $$1, $$2}' Makefile
@@ -111,6 +111,9 @@ gallery: $(STAMP) ## run all experiments (GALLERY_OPTIONS=--quick: minutes)
 docs: $(DOCS_STAMP) ## build these pages with API, gallery and search as a site, in results/docs
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs/site . results/docs
 	@echo "The first page is results/docs/index.html"
+
+live: $(STAMP) ## build the live pages in docs/live from their sources in docs/site/live
+	$(BIN)/python docs/site/live/build.py
 
 mesh: $(MESH_STAMP) ## make the meshes again (installs gmsh; the others do not need it)
 	$(BIN)/python experiments/make_meshes.py $(MESH_OPTIONS)

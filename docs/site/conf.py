@@ -4,6 +4,7 @@
 repository, and docstrings are in NumPy style.
 """
 
+import re
 import sys
 from pathlib import Path
 
@@ -80,6 +81,8 @@ def experiments():
 def with_lists(app, name, source):
     """Add what is listed elsewhere: the pages to the first one, experiments to the gallery."""
     if name == root_doc:
+        # A link of Markdown to a file would lead to a copy beside no page.
+        source[0] = re.sub(r"\[([^][]+)\]\((docs/live/.*?)\)", r'<a href="\2">\1</a>', source[0])
         source[0] += "\n".join(contents())
     if name == "docs/site/gallery":
         source[0] += "\n".join(experiments())
@@ -88,10 +91,14 @@ def with_lists(app, name, source):
 def setup(app):
     """Connect what completes the pages, and give the first one the name that a browser opens."""
     app.connect("source-read", with_lists)
-    app.connect("build-finished", lambda app, error: error or first_page(Path(app.outdir)))
+    app.connect("build-finished", lambda app, error: error or add_files(Path(app.outdir)))
 
 
-def first_page(folder):
-    """A first page that leads on to the README."""
+def add_files(folder):
+    """A first page that leads on to the README, and the live pages, with links to these pages."""
     leads = '<meta http-equiv="refresh" content="0; url=README.html">'
     (folder / "index.html").write_text(leads, encoding="utf-8")
+    (folder / "docs/live").mkdir(exist_ok=True)
+    for page in (ROOT / "docs/live").glob("*.html"):
+        text = page.read_text(encoding="utf-8").replace('.md">', '.html">')
+        (folder / "docs/live" / page.name).write_text(text, encoding="utf-8")

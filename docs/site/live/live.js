@@ -13,6 +13,13 @@ function unpack({ kind, data: text }) {
 const solidOf = (mesh, options) =>
   new Solid(Float64Array.from(unpack(mesh.points)), Int32Array.from(unpack(mesh.tetrahedra)), mesh.material, { held: mesh.held, ...options });
 
+// A push of the left end that fades along the bar, so that neighbours differ little.
+function pushOf(solid) {
+  const velocity = new Float64Array(3 * solid.count);
+  for (let i = 0; i < solid.count; i++) velocity[3 * i] = solid.centre[3 * i] < 0.2 ? Math.cos((Math.PI * solid.centre[3 * i]) / 0.4) ** 2 : 0;
+  return velocity;
+}
+
 // State of the page is in its address, so that a link shows what its sender saw.
 const address = new URLSearchParams(location.hash.slice(1));
 function remember(values) {
@@ -66,7 +73,7 @@ function animation(each) {
 }
 
 // Calls work() until it returns false, a number of times is done, or a time [ms] is over.
-function within_ms(most, count, work) {
+function workFor(most, count, work) {
   const end = performance.now() + most;
   for (let k = 0; k < count; k++) if (work() === false || performance.now() > end) return;
 }
@@ -134,6 +141,8 @@ function shares(place, rows) {
   });
 }
 
+const LIGHT = [-0.33, 0.52, 0.79];
+
 // A colour between black, itself and white: light from -1 to 1.
 function lit(hex, light) {
   const n = parseInt(hex.slice(1), 16), to = light > 0 ? 255 : 0, s = Math.abs(light);
@@ -141,7 +150,13 @@ function lit(hex, light) {
   return `rgb(${part(16)},${part(8)},${part(0)})`;
 }
 
-const LIGHT = [-0.33, 0.52, 0.79];
+// A colour between two of six digits.
+function mixed(from, to, share) {
+  const [a, b] = [from, to].map((one) => parseInt(one.slice(1), 16));
+  const part = (shift) => Math.round(((a >> shift) & 255) * (1 - share) + ((b >> shift) & 255) * share);
+  return `#${((1 << 24) | (part(16) << 16) | (part(8) << 8) | part(0)).toString(16).slice(1)}`;
+}
+
 // Draws the faces of a solid that show, the far ones first. view: turn (rows to the right, up and
 // towards the eye), middle [m], distance of the eye [m], scale [pixels / m] and place of the middle.
 // fill(i): colour of a body. Returns what is drawn: [face, six screen coordinates], the near last.

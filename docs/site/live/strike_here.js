@@ -32,14 +32,17 @@ function strike(place, size) {
 }
 
 // Slow at first, as the wave runs: each frame takes a share of the steps so far.
-const play = animation(() => {
+const play = animation((frame) => {
   const wanted = Math.max(1, Math.round(0.03 * plate.steps));
-  within_ms(11, wanted, () => {
+  workFor(11, wanted, () => {
     plate.step();
     if (whole) whole.step();
   });
-  show();
-  return plate.steps * data.dt < END;
+  const on = plate.steps * data.dt < END;
+  // Numbers change too fast to be read in every frame.
+  if (frame % 6 && on) draw();
+  else show();
+  return on;
 });
 
 // Bits of what has acted in a body: 1 softening, 2 slip, 4 contact, 8 friction.
