@@ -2,7 +2,6 @@
 
 A filling is a frozen dataclass of a user's options (``Filling``). It binds itself to the scenes of
 an engine (``DeviceFilling``), which then runs every batch of the same ``FillingStructure``.
-``fixed_mass.py`` has a complete example.
 """
 
 from collections.abc import Hashable

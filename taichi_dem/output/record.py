@@ -324,8 +324,7 @@ def write_paraview(
     name : str, optional
         Name of the files; that of the folder if None.
     acting_since : mapping, optional
-        Times from which effects acted on each body [s], (body_count,) by name, NaN for never. Cells
-        then carry NAME_acts, 1 from that time, and NAME_since_s.
+        When effects acted first on each body [s], by name; cells then carry NAME_since_s.
 
     Notes
     -----

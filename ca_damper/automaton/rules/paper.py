@@ -94,8 +94,7 @@ class Paper(Rules):
 
     References
     ----------
-    Komatsuzaki, Sato, Iwata, Morishita, "Modeling of granular damper using cellular automata",
-    section 5.
+    Komatsuzaki, Sato, Iwata, Morishita, section 5.
     """
 
     accounting: str = "all"
