@@ -53,8 +53,7 @@ class Blows:
     """Impacts of a filling on the container in a step, before any is carried out.
 
     impulse: of those on floor and ceiling, on a container that they would not move, along x [N s].
-    struck: mass of what meets floor and ceiling [kg], which resists as if it were carried. rubbed:
-    mass of what side walls drag [kg]. carried: as of an Action.
+    struck: mass of what meets floor and ceiling [kg]. rubbed: of what side walls drag.
     """
 
     impulse: ti.f64

@@ -247,8 +247,7 @@ class Material:
         Raises
         ------
         InputError
-            A value is out of its range. Whether the fracture energy suffices for the largest
-            elements is checked by the scene, which has the mesh.
+            A value is out of its range; the scene checks the fracture energy.
 
         References
         ----------

@@ -330,8 +330,7 @@ def write_paraview(
     -----
     Cells carry body_id, level, speed_m_s, displacement_m, damage, step_bound_by, the place in
     ``step_control.CRITERIA`` of what bounds a body's step, stress_Pa, nine components by rows, and
-    largest_stress_Pa, the largest principal one; with several materials also material, the number
-    of each body's. An earlier series of that name is removed.
+    largest_stress_Pa, the largest principal one; with several materials also material.
     """
     instance("model", model, Model)
     frames = several("frames", frames, lambda what, one: instance(what, one, Frame))
