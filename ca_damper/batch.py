@@ -59,8 +59,7 @@ class Batch(LoadedScenes):
     ----------
     filling : Filling or sequence of Filling
         Filling of the containers, such as ``Automaton()`` or ``Spheres()``; or one for each scene,
-        all of one class with the same rules and effects, friction, starts and gravity sideways in
-        all or none, which differ in numbers and sizes.
+        all of one class with the same rules and effects, which differ in numbers and sizes.
     table : SceneTable
         Parameters of the scenes; the batch copies them. ``table.dt`` holds the largest step of each
         scene [s], which is shortened so that a whole number of steps makes a cycle of the base.

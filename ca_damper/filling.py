@@ -2,7 +2,6 @@
 
 A filling is a frozen dataclass of a user's options (``Filling``). It binds itself to the scenes of
 an engine (``DeviceFilling``), which then runs every batch of the same ``FillingStructure``.
-``fixed_mass.py`` has a complete example.
 """
 
 from collections.abc import Hashable
@@ -54,8 +53,7 @@ class Blows:
     """Impacts of a filling on the container in a step, before any is carried out.
 
     impulse: of those on floor and ceiling, on a container that they would not move, along x [N s].
-    struck: mass of what meets floor and ceiling [kg], which resists as if it were carried. rubbed:
-    mass of what side walls drag [kg]. carried: as of an Action.
+    struck: mass of what meets floor and ceiling [kg]. rubbed: of what side walls drag.
     """
 
     impulse: ti.f64

@@ -56,8 +56,7 @@ def solve_response(
     oscillator : Oscillator, optional
         Primary structure; that of the paper if None.
     ratios : tuple of (float, float), optional
-        Range (lowest, highest) of f/f0 [-] in which to look for a peak. None: one around the
-        natural frequency, which grows if the peak is outside.
+        Range (lowest, highest) of f/f0 [-] of a peak; None: around the natural frequency.
     seeds : int or sequence of int, optional
         Number of seeds or the seeds themselves; as many as it takes if None.
     sources : iterable of str, default ("step",)

@@ -116,8 +116,7 @@ class ModalStructure:
         Raises
         ------
         InputError
-            The matrices do not fit, or the stiffness is not symmetric and positive definite, as
-            that of a structure that does not hang on the base.
+            The matrices do not fit, or the stiffness is not symmetric and positive definite.
         """
         m = _mass_matrix("mass", mass)
         k = _array("stiffness", stiffness, 2)
@@ -236,11 +235,9 @@ class Box:
     particles : int
         Number of particles.
     seed : int, optional
-        Number that starts its particles, together with the seed of the run. None: the number of the
-        box in the list, so that boxes differ.
+        Number that starts its particles, with the seed of the run. None: its number in the list.
     filling : Filling, optional
-        Its own filling, of the class, rules and effects of the others: grains and box of another
-        size. None: that of the run.
+        Its own filling, of the class, rules and effects of the others. None: that of the run.
     """
 
     place: int

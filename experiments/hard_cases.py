@@ -117,14 +117,14 @@ def picture_wall(path, trials):
     levels = {name: level_of(own) for name, own in by_name(trials).items()}
     names = sorted(levels, key=lambda name: [*WALL].index(levels[name]))
     counts, columns = Counter(levels.values()), min(ACROSS, len(names))
-    with picture(path, size=(5.0, 3.6), dpi=300) as (figure, axes):
+    with picture(path, size=(5.0, 4.0), dpi=300) as (figure, axes):
         for k, name in enumerate(names):
             place, look = (k % columns, k // columns), {"fc": WALL[levels[name]], "lw": 0.0}
             axes.add_patch(Rectangle(place, 0.88, 0.88, **look))
         axes.set(xlim=(-0.1, columns), ylim=(-(-len(names) // columns), -0.1), aspect="equal")
         axes.set_axis_off()
         thin = ", ".join(name.replace("_", " ") for name in names if levels[name] == "1 to 2")
-        axes.set_title(fill(thin and f"1 to 2: {thin}", 72), fontsize=8, loc="left")
+        axes.set_title(fill(thin and f"1 to 2: {thin}", 88), fontsize=8, loc="left")
         keys = [area_key(f"{name}: {counts[name]}", fc=colour) for name, colour in WALL.items()]
         look = {"loc": "outside lower center", "ncols": 3, "fontsize": 9.5, "title_fontsize": 9.5}
         title = f"{len(names)} hard cases, by what physics allows over what a run shows"

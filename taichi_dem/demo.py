@@ -6,9 +6,8 @@ Expect a crushed zone at the hole, cracks that run out from it, and a wedge at t
     python -m taichi_dem demo --out mine         # pictures and tables into ./mine
     python -m taichi_dem demo --all-pictures     # also energy, pressure, since when effects act
 
-Writes cracks.png, blast.gif, view.html (a page in which the block turns and plays), history.csv,
-bonds.csv (when each bond broke), bodies.csv, the mesh used, summary.json and a ParaView series to
-results/blast_demo/.
+Writes cracks.png, blast.gif, view.html (the block turns and plays), tables, the mesh used,
+summary.json and a ParaView series to results/blast_demo/.
 """
 
 from argparse import Namespace

@@ -50,8 +50,7 @@ class Scene(Pictured):
         Constants of bodies and bonds.
     effects : sequence of Effect or str, default ()
         A list: exactly these effects are computed. ``"auto"``: the laws of the material, contact
-        by ``BodyContact`` and ``StickingFriction``, each evaluated only where and when it acts.
-        ``"all"``: the same laws, evaluated everywhere.
+        by ``BodyContact`` and ``StickingFriction``, where and when they act. ``"all"``: everywhere.
     max_speed : float, default 10000.0
         Speed beyond which a run counts as diverged [m/s].
     loads : iterable of Effect, default ()
@@ -61,7 +60,6 @@ class Scene(Pictured):
         of their bond begins, and of their part's mean speed. None: 1e-6; at most 0.01, 0: none.
     unbonded : iterable of str, default ()
         Names of groups of inner faces without bonds from the start, as a notch or an open joint.
-        Both sides are free, and touch as broken faces do.
     weaker : mapping, optional
         Share of the area of its faces that is bonded, above 0 and at most 1, by the name of a group
         of inner faces. Stiffness, damping, strength, cohesion and fracture energy per area of the

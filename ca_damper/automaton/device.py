@@ -27,8 +27,7 @@ _BY = {name: (kind,) for name, (kind, _) in _COUNTED.items()}
 def parameters_of(automaton: object) -> dict[str, float]:
     """Numbers that kernels read, and those of the rules.
 
-    gravity downwards and sideways, to the right [m/s^2]; restitution of particles and at walls;
-    threshold of static contact in units of g dt.
+    gravity down and to the right [m/s^2]; restitutions; threshold of static contact over g dt.
     """
     return {
         "width": automaton.width,

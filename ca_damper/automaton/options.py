@@ -59,8 +59,7 @@ class Automaton:
     Parameters
     ----------
     rules : Place or Paper, default Place()
-        How particles fly, meet, rest and act on the container: by rules of place or those of the
-        paper, with their options, or by a rule set of your own.
+        How particles fly, meet, rest and act on the container: a rule set, of place by default.
     restitution : float, default 0.75
         Restitution coefficient between particles, from 0 to 1.
     wall_restitution : float, default 0.75

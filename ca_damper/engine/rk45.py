@@ -1,8 +1,7 @@
 """Dormand-Prince 5(4) for any right-hand side, in Python and inside kernels alike (ti.pyfunc).
 
 ``rhs(context, t, y)`` returns dy/dt; in a kernel it is a ti.func, ``y`` a ti.Vector. Source:
-Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; step sizes: Hairer, Norsett and Wanner,
-Solving Ordinary Differential Equations I, section II.4.
+Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; steps: Hairer et al., ODEs I, II.4.
 """
 
 import taichi as ti

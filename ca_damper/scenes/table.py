@@ -19,8 +19,7 @@ class SceneTable:
     """Parameters of each scene of a batch, one row a scene; plain NumPy.
 
     Plain NumPy. Parameters are given as scalars or sequences and are broadcast against each other.
-    A Batch checks them against its filling. What a scene does depends on its own row only, so that
-    no bit depends on the rest of the batch.
+    A Batch checks them against its filling. What a scene does depends on its own row only.
 
     Parameters
     ----------

@@ -1,8 +1,7 @@
 """Friction with tangential history: springs that live as long as their contacts touch.
 
 Cundall and Strack (1979), limited by Coulomb's law; stiffness of Mindlin (1949). As in Thornton,
-Cummins and Cleary (2013) a contact that grows keeps its force, and one that shrinks loses it in
-proportion, so that no change of the overlap makes energy.
+Cummins and Cleary (2013) a contact that grows keeps its force, one that shrinks loses its share.
 """
 
 import taichi as ti

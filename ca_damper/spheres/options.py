@@ -94,11 +94,9 @@ class Spheres:
     search : str, default "cells"
         ``"cells"``, or ``"all_pairs"`` as in the paper: the same bits, but slower above 10 spheres.
     start : array_like, optional
-        Positions of the spheres from the lower left inner corner [m], shape (particles, 2), for all
-        scenes. None: random ones from the seed of each scene.
+        Positions of the spheres from the lower left inner corner [m], (particles, 2); None: random.
     friction_law : str, default "viscous"
-        ``"viscous"``: grows with small slip, so that heaps creep. ``"history"``: a tangential
-        spring for each contact, which holds heaps at rest.
+        ``"viscous"``: small slip creeps. ``"history"``: a spring each, which holds heaps at rest.
     sizes : sequence of (int, float), optional
         (number, diameter [m]) of each size; the box holds as many as there would be of the largest.
     start_velocity : array_like, optional

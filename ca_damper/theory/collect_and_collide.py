@@ -73,8 +73,7 @@ def collect_and_collide(amplitude: ArrayLike, gap: ArrayLike) -> CollectAndColli
 
     References
     ----------
-    Bannerman et al., Phys. Rev. E 84 (2011) 011301; Sack et al., Phys. Rev. Lett. 111 (2013)
-    018001.
+    Bannerman et al., Phys. Rev. E 84 (2011) 011301; Sack et al., PRL 111 (2013) 018001.
 
     Examples
     --------

@@ -27,8 +27,7 @@ def logarithmic_decrement(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     -----
     An amplitude is half the distance between two neighbouring extremes, so that a constant sag has
     no part in it. The decrement there is ln(a[k] / a[k + 2]), of the whole cycle around it; a
-    damping ratio z gives 2 pi z / sqrt(1 - z^2) at every amplitude. The decay ends where the motion
-    ends or changes direction within a few samples.
+    damping ratio z gives 2 pi z / sqrt(1 - z^2) at every amplitude. It ends as the motion does.
 
     Examples
     --------

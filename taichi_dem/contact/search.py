@@ -9,8 +9,7 @@ Invariants, at any tick between two searches:
 - No path is longer than its horizon: a search is requested before that.
 
 So a search visits the bodies that have come near their horizon or that a break has set free, and
-compares pairs whose ``until`` lies below the new horizons. The times of searches change no result,
-nor does a search that lacks room.
+compares pairs whose ``until`` lies below the new horizons. The times of searches change no result.
 """
 
 from typing import Any, Protocol

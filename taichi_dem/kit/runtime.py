@@ -83,8 +83,7 @@ def start(arch: str = "cpu", threads: int | None = None, debug: bool = False) ->
     ------
     InputError
         The architecture is unknown or absent, or its device has no doubles; the number of threads
-        is out of range; Taichi already runs with other settings in this process, or this is a fork
-        of the process that runs Taichi.
+        is out of range; or Taichi already runs otherwise, or in the process that forked this.
     """
     global _session
     wanted = _checked(arch, threads, debug)

@@ -35,8 +35,7 @@ class BodyGeometry(Geometry):
     """Whole bodies meet each other, also at outer faces, by rays from their middles to their faces.
 
     The size of an overlap is q, where flat sides meet: the root of the contact area times the
-    depth. q0 is the smallest q since the two could first touch, so a break injects no energy. A
-    law gets the overlap (q - q0) / sqrt(area).
+    depth. q0 is the smallest q since the two could touch. A law gets (q - q0) / sqrt(area).
 
     Parameters
     ----------

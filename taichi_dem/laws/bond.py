@@ -30,8 +30,7 @@ class Softening(TensionLaw):
 
     Notes
     -----
-    Unloading goes to the origin and the elastic limit moves to where it began; compression keeps
-    the full stiffness. One failed unit releases the whole face.
+    Unloading goes to the origin; compression stays stiff. One failed unit releases the face.
     """
 
     may_be_silent = True

@@ -34,13 +34,11 @@ class CohesiveCrack(DamageLaw):
     traction. Opening and sliding soften with one damage, along two lines. Pressed faces slide
     beyond the cohesion and friction of the material, soften likewise, and rub once they are
     damaged. In pure sliding a unit spends G_f (k_n / k_s) (c / f_t)^2, which makes it as brittle as
-    in tension. Unloading goes to the origin. A face is released once two of its three units have
-    failed and one of these is not pressed.
+    in tension. Unloading goes to the origin. A face goes with two of its units, one not pressed.
 
     References
     ----------
-    Petersson, Report TVBM-1006, Lund (1981), for the two lines; Alfano and Sacco, Int. J. Numer.
-    Meth. Eng. 68 (2006) 542, for friction beside damage.
+    Petersson, Report TVBM-1006, Lund (1981); Alfano and Sacco, IJNME 68 (2006) 542.
     """
 
     may_be_silent = True

@@ -65,8 +65,7 @@ class Geometry(Effect):
     Parameters
     ----------
     outer_faces : bool or str
-        True: outer faces touch from the start. ``"once_broken"``: from the first break of any bond.
-        False: only broken faces touch.
+        True: they touch from the start. ``"once_broken"``: from the first break. False: never.
     skin : float
         Gap up to which an entry is listed, as a share of a body's extent: time, not results.
     """

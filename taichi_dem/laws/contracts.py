@@ -1,8 +1,7 @@
 """Contracts: what an effect gives, by the class that it derives from.
 
 An abstract method has to be given; any other returns what an effect without the ability would.
-Methods without types are ``ti.func`` methods of the bound effect. Their arguments have one order:
-pair of materials, entry, numbers.
+Methods without types are ``ti.func``. Arguments: pair of materials, entry, numbers.
 """
 
 from abc import abstractmethod

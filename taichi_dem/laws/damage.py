@@ -9,8 +9,7 @@ from taichi_dem.laws.contracts import BondLaw
 class DamageLaw(BondLaw):
     """Base of laws that keep of every unit ``unit``: its damage [-], the energy spent [J/m^2].
 
-    A law declares ``unit``, a field of vectors of three. The last is the ``reach`` of a failed
-    unit, and what a law likes below 1 of one that holds.
+    A law declares ``unit``, a field of vectors of three; the last is a failed unit's ``reach``.
     """
 
     unit: ti.MatrixField

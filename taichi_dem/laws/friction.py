@@ -55,8 +55,7 @@ class StickingFriction(Friction):
 
     A body at rest on a slope below the friction angle stays there; with ``Friction`` it creeps. The
     stretch of a spring turns with the first body and is lost when the two part. Between bodies
-    (``BodyContact``) the spring always has the area of the smaller body's largest face: with the
-    area of contact it would creep.
+    (``BodyContact``) the spring always has the area of the smaller body's largest face.
 
     Parameters
     ----------

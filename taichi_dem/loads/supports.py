@@ -335,8 +335,7 @@ class QuietBoundary(Ground):
 
     References
     ----------
-    J. Lysmer and R. L. Kuhlemeyer, Finite dynamic model for infinite media, J. Eng. Mech. Div. ASCE
-    95(EM4), 1969, 859-877, eq. 1 and 2.
+    Lysmer and Kuhlemeyer, J. Eng. Mech. Div. ASCE 95(EM4), 1969, 859-877, eq. 1 and 2.
     """
 
     def __init__(self, group: str, p_speed: float | None = None, s_speed: float | None = None):

@@ -124,8 +124,7 @@ def _ratio_of(poisson):
 class Material:
     """Constants of one homogeneous material (Konno et al., sections 2.1 and 2.2, Table 1).
 
-    Stiffnesses and dashpots are numbers, the same for all bonds, or rules by which they follow from
-    moduli and the sizes of the bodies (``from_elastic``).
+    Stiffnesses and dashpots are numbers, or rules of moduli and sizes (``from_elastic``).
 
     Parameters
     ----------
@@ -156,8 +155,7 @@ class Material:
         drawn by the seed of the scene. Tensile strength, cohesion and fracture energies of a bond
         vary together, so that its opening at failure stays; those given are the means.
     strength_volume : float, default 0.0
-        Volume [m^3] of rock that has this strength in the mean; larger bonds are weaker, smaller
-        ones stronger, by the Weibull modulus. 0: all sizes alike.
+        Volume [m^3] of rock with this mean strength; larger bonds are weaker. 0: all sizes alike.
     coarse : {"refuse", "weaken"}, default "refuse"
         What a scene does if elements are too large for strength and energy (``from_elastic``).
 
@@ -249,8 +247,7 @@ class Material:
         Raises
         ------
         InputError
-            A value is out of its range. Whether the fracture energy suffices for the largest
-            elements is checked by the scene, which has the mesh.
+            A value is out of its range; the scene checks the fracture energy.
 
         References
         ----------

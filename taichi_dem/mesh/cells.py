@@ -1,7 +1,6 @@
 """Cells of mesh files, as meshio gives them, cut into tetrahedra and triangles; their groups.
 
-Source: Dompierre, Labbe, Vallet, Camarero, How to subdivide pyramids, prisms, and hexahedra into
-tetrahedra, 8th International Meshing Roundtable, 1999.
+Source: Dompierre, Labbe, Vallet, Camarero, 8th International Meshing Roundtable, 1999.
 """
 
 from collections.abc import Iterator

@@ -260,8 +260,7 @@ def checked_mesh(
         Points not farther apart than this become one [m]; 0 welds nothing.
     keep_coincident : bool, default False
         Accept distinct points at one place. Faces on them are free surfaces, as of two blocks that
-        touch, a joint or a crack; they need a contact of outer faces. Without it such points are
-        refused, as bodies that seem joined would have no bond.
+        touch, a joint or a crack; they need a contact of outer faces. Else such points are refused.
     body_groups : mapping, optional
         Numbers of tetrahedra (k,) by name.
 

@@ -258,8 +258,7 @@ def edge_colours(links: np.ndarray, body_count: int) -> np.ndarray:
 class _Colouring:
     """Links that have a colour so far.
 
-    taken: bits of the colours at each body; at: the link of each colour at each body, in rows of
-    ``width``; counts: links of each colour.
+    taken: bits of the colours at each body; at: its links by colour; counts: links of each colour.
     """
 
     def __init__(self, links, body_count):

@@ -324,15 +324,13 @@ def write_paraview(
     name : str, optional
         Name of the files; that of the folder if None.
     acting_since : mapping, optional
-        Times from which effects acted on each body [s], (body_count,) by name, NaN for never. Cells
-        then carry NAME_acts, 1 from that time, and NAME_since_s.
+        When effects acted first on each body [s], by name; cells then carry NAME_since_s.
 
     Notes
     -----
     Cells carry body_id, level, speed_m_s, displacement_m, damage, step_bound_by, the place in
     ``step_control.CRITERIA`` of what bounds a body's step, stress_Pa, nine components by rows, and
-    largest_stress_Pa, the largest principal one; with several materials also material, the number
-    of each body's. An earlier series of that name is removed.
+    largest_stress_Pa, the largest principal one; with several materials also material.
     """
     instance("model", model, Model)
     frames = several("frames", frames, lambda what, one: instance(what, one, Frame))

@@ -31,8 +31,7 @@ class BondMotion:
 def bond_motion(frame, branch, rotation_i, rotation_j, velocity, spin_i, spin_j):
     """Motion of slave j against master i.
 
-    frame: rows normal, xi, eta in the master's body frame. branch: world vector between the
-    centres [m]. velocity: slave's minus master's [m/s].
+    frame: normal, xi, eta in the master. branch [m], velocity [m/s]: slave's minus master's.
     """
     axes = matmul_transposed(frame, rotation_i)
     return BondMotion(

@@ -16,8 +16,7 @@ _MATRICES = ti.types.ndarray(dtype=ti.f64, ndim=3)
 def angular_momenta(orientation: np.ndarray, spin: np.ndarray, inertia: np.ndarray) -> np.ndarray:
     """Angular momenta (n, 3) of n bodies [kg m^2/s].
 
-    orientation: unit quaternions (n, 4). spin: in world axes (n, 3) [rad/s]. inertia: in body axes
-    (n, 3, 3) [kg m^2].
+    orientation: unit quaternions. spin: in world axes [rad/s]. inertia: in body axes [kg m^2].
     """
     momenta = np.empty((len(spin), 3))
     _launch_momenta(*_rows(orientation, spin, inertia), momenta)
@@ -34,8 +33,7 @@ def rotations(orientation: np.ndarray) -> np.ndarray:
 def spins(orientation: np.ndarray, inertia_inverse: np.ndarray, momentum: np.ndarray) -> np.ndarray:
     """World spins (n, 3) [rad/s] of n bodies.
 
-    orientation: unit quaternions (n, 4). inertia_inverse: in body axes (n, 3, 3) [1/(kg m^2)].
-    momentum: angular, in world axes (n, 3) [kg m^2/s].
+    orientation: unit quaternions. inertia_inverse: in body axes. momentum: angular, in world axes.
     """
     spin_rates = np.empty((len(momentum), 3))
     _launch_spins(*_rows(orientation, inertia_inverse, momentum), spin_rates)

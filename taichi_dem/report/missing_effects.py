@@ -46,8 +46,7 @@ class MissingEffect:
     """An effect that the scene needs and does not list.
 
     effect: the effect to list. what: the finding in words. count: number of places. where: first
-    such bond or body, as unit says; place_m: the middle of its face, or of the body, in the mesh
-    [m]. first_s: time at which it was first found [s].
+    such bond or body; place_m: middle of its face, or of the body [m]. first_s: time of it [s].
     """
 
     effect: str
@@ -101,8 +100,7 @@ class MissingEffects(Kept):
     """Finds where an absent effect would have acted.
 
     Limits of bonds are watched at every step, all else at recording times. found: a row for each
-    need: number of places, the first one, and when [s]. strain: largest strain energy of each bond
-    at a recording [J], where dashpots are missing.
+    need: number of places, the first, and when [s]. strain: largest of each bond, for dashpots [J].
     """
 
     kept = "last_s", "found", "strain"

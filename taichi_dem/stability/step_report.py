@@ -210,8 +210,7 @@ class ElasticReport:
     stiffness : MeshStiffness
         Elastic constants of the block that the mesh is.
     asked : tuple of (float, float) or None
-        Young's modulus [Pa] and Poisson's ratio for which the material was made; None for a
-        material of constants per area, and for several materials.
+        Young's modulus [Pa] and Poisson's ratio of the one material, if made from them; else None.
     crack_length : ndarray
         Characteristic length E G_f / tensile_strength^2 of the tip of a crack [m] at each body,
         (body_count,); with several materials by the E of a mesh of the body's material alone.

@@ -94,8 +94,7 @@ class Tables:
     eta in the master's body frame; vertex_master (face frame), vertex_slave (body frame) [m]: an
     entry a contact unit. neighbour, face_bond: behind local face f of a body, entry 4 * body + f,
     or -1. bond_pair: row of a bond's materials in the table of a law. extent: within which
-    all of a body lies that can touch [m]. on_demand: whether laws are only evaluated where they
-    act.
+    all of a body lies that can touch [m]. on_demand: laws are evaluated only where they act.
     """
 
     constant_fields = (

@@ -73,8 +73,7 @@ class PaperDevice(LatticeDevice):
 class Paper(Rules):
     """Rules of Komatsuzaki et al., to reproduce the paper.
 
-    Particles fly in six directions and collide with what is in the cell ahead. A UserWarning before
-    a run says where these rules are known to fail.
+    Particles fly in six directions and collide with what is in the cell ahead.
 
     Parameters
     ----------
@@ -94,8 +93,7 @@ class Paper(Rules):
 
     References
     ----------
-    Komatsuzaki, Sato, Iwata, Morishita, "Modeling of granular damper using cellular automata",
-    section 5.
+    Komatsuzaki, Sato, Iwata, Morishita, section 5.
     """
 
     accounting: str = "all"
