@@ -52,6 +52,8 @@ class Signal:
         Treatment of samples before the signal was made, in words.
     apart : float, default 0.0
         Time between the samples that it was made of [s]; 0 for a formula.
+    gap : float, default 0.0
+        Longest gap between samples that was bridged [s].
 
     References
     ----------
@@ -64,6 +66,7 @@ class Signal:
     label: str = "signal"
     treated: str = ""
     apart: float = 0.0
+    gap: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "step", positive("step", self.step))
