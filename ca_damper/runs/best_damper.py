@@ -91,8 +91,8 @@ class BestDamper(Tabulated):
         The value after errors of manufacture, by the filling that confirms.
     tried : tuple of (Grains, float)
         Boxes of the first look and their values [m].
-    search_seconds, confirmation_seconds : float
-        CPU time of the search and its bar, and of the rest [s], compiling included.
+    search_seconds : float
+        CPU time of the search and its bar [s], compiling included.
     """
 
     grains: Grains
@@ -105,18 +105,11 @@ class BestDamper(Tabulated):
     errors: dict[str, Value]
     tried: tuple[tuple[Grains, float], ...]
     search_seconds: float
-    confirmation_seconds: float
 
     def __str__(self) -> str:
-        best, mm = self.grains, 1e3
-        words = [
-            f"without grains {mm * self.without:.3g} mm, with fixed ones {mm * self.fixed:.3g} mm, "
-            f"with free ones {self.value}",
-            self.why,
-            f"{best.particles} grains of {mm * best.diameter:.3g} mm in a box of "
-            f"{mm * best.width:.3g} x {mm * best.height:.3g} mm, clearance "
-            f"{mm * best.clearance:.3g} mm",
-        ]
+        without, fixed = (f"{1e3 * one:.3g} mm" for one in (self.without, self.fixed))
+        words = [f"without grains {without}, with fixed ones {fixed}, with free ones {self.value}"]
+        words += [self.why, str(self.grains)]
         if self.confirmed is not None:
             words.append(f"confirmed: {self.confirmed}")
         words += [f"{name}: {value}" for name, value in self.errors.items()]
@@ -147,15 +140,15 @@ class BestDamper(Tabulated):
     def at_ends(self) -> tuple[str, ...]:
         """What of the best box lies at an end of what was tried, in words."""
         best, boxes = self.grains, [one for one, _ in self.tried]
-        numbers = {float(one.particles) for one in boxes}
-        heights = {one.height for one in boxes if one.particles == best.particles}
+        counts = [one.particles for one in boxes]
+        heights = [one.height for one in boxes if one.particles == best.particles]
         found = []
         for name, own, tried in (
-            ("number of grains", float(best.particles), numbers),
+            ("number of grains", best.particles, counts),
             ("height", best.height, heights),
         ):
-            ends = {"smallest": min(tried), "largest": max(tried)} if len(tried) > 1 else {}
-            found += [f"{side} {name}" for side, end in ends.items() if own == end]
+            ends = ("smallest", min(tried)), ("largest", max(tried))
+            found += [f"{side} {name}" for side, end in ends if own == end and len({*tried}) > 1]
         return tuple(found)
 
     def columns(self) -> dict[str, Any]:
@@ -272,13 +265,9 @@ def _rank(value):
 
 def _confirmed(case, filling, best, seeds, tolerance):
     """The winner by another filling, and after errors of manufacture: fields of a BestDamper."""
-    begun, confirmed, errors = time.process_time(), None, {}
-    if filling is not None:
-        confirmed = Value.of(*case.values(filling, best, seeds))
-        for name, one in best.with_errors(tolerance):
-            errors[name] = Value.of(*case.values(filling, one, seeds))
-    spent = time.process_time() - begun
-    return {"confirmed": confirmed, "errors": errors, "confirmation_seconds": spent}
+    boxes = {} if filling is None else {"": best, **dict(best.with_errors(tolerance))}
+    errors = {name: Value.of(*case.values(filling, one, seeds)) for name, one in boxes.items()}
+    return {"confirmed": errors.pop("", None), "errors": errors}
 
 
 class _Case:
@@ -293,7 +282,7 @@ class _Case:
         if self.mass > oscillator.mass:
             got, most = told_apart(self.mass, oscillator.mass)
             raise InputError(f"mass must be at most that of the oscillator, {most} kg, got {got}")
-        self.signal = None if is_real(motion) else excitation_of(motion)
+        self.signal: Any = None if is_real(motion) else excitation_of(motion)
         if self.signal is None:
             self.oscillator = replace(oscillator, base_amplitude=positive("motion", motion))
             if oscillator.damping == 0.0:
@@ -318,7 +307,7 @@ class _Case:
         search = SteadyPeak(filling, (transient, measured), self.tell, **job)
         return search.run(low, _ABOVE, *((0,) if brief else ()))
 
-    def beside(self, gravity: float) -> dict[str, float]:
+    def beside(self, gravity: float) -> dict[str, Any]:
         """What is to be small without grains and with fixed ones: fields of a BestDamper."""
         own = self.oscillator
         if self.signal is None:

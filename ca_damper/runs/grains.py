@@ -27,6 +27,12 @@ class Grains(NamedTuple):
     width: float
     height: float
 
+    def __str__(self) -> str:
+        sizes = (self.diameter, self.width, self.height, self.clearance)
+        size, width, height, gap = (f"{1e3 * one:.3g}" for one in sizes)
+        box = f"{width} x {height} mm, clearance {gap} mm"
+        return f"{self.particles} grains of {size} mm in a box of {box}"
+
     @property
     def settled(self) -> float:
         """Height of the settled grains [m]."""

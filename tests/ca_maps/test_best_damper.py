@@ -101,9 +101,9 @@ def test_a_winner_at_an_end_of_what_was_tried_says_so(place, ends):
     boxes = boxes_of(6e-3, (10, 20, 30), BOX, DENSITY, 3)
     value, none = Value(1e-3, 1e-4), (None, 2e-3, 2e-3, 2.0, (), {})
     tried = tuple((box, 1e-3) for box in boxes)
-    made = BestDamper(boxes[place], value, *none, tried, 0.0, 0.0)
+    made = BestDamper(boxes[place], value, *none, tried, 0.0)
     assert len(made.at_ends) == ends and ("may be better" in str(made)) == bool(ends)
-    assert BestDamper(boxes[0], value, *none, tried[:1], 0.0, 0.0).at_ends == ()
+    assert BestDamper(boxes[0], value, *none, tried[:1], 0.0).at_ends == ()
 
 
 def test_a_box_whose_scenes_diverge_is_no_winner():
