@@ -6,9 +6,8 @@ with u = (t - t0) / h, w = 1 - u, values y and second derivatives m,
 
     y(t) = w y0 + u y1 + h^2 / 6 ((w^3 - w) m0 + (u^3 - u) m1).
 
-The second derivative is then linear between the nodes. Where an acceleration gives the m
-themselves, their double integral is exact; for samples of the function SciPy has the m by its
-continuity (de Boor, A Practical Guide to Splines, chapter IV, with the condition "not a knot").
+An acceleration gives the m themselves; for samples of the function they follow from continuity
+(de Boor, A Practical Guide to Splines, chapter IV, with the condition "not a knot").
 """
 
 from dataclasses import dataclass, replace
