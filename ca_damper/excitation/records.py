@@ -1,9 +1,15 @@
 """Records of motions as engineers have them: CSV files of many makes, and AT2 files of PEER."""
 
+import csv
+import io
+import math
 import re
+from collections.abc import Iterable
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from unicodedata import normalize
 
 import numpy as np
 
@@ -21,12 +27,17 @@ UNITS = {
     **{unit: ("velocity", size) for unit, size in (("m_s", 1.0), ("cm_s", 1e-2), ("mm_s", 1e-3))},
     **{"m_s2": ("acceleration", 1.0), "cm_s2": ("acceleration", 1e-2)},
     **{"mm_s2": ("acceleration", 1e-3), "gal": ("acceleration", 1e-2)},
-    "g": ("acceleration", 9.80665),
+    **{"g": ("acceleration", 9.80665), "mg": ("acceleration", 9.80665e-3)},
 }
-#: Name and unit of a header.
-_HEADER = re.compile(r"[a-zA-Z]+[\s_]*[(\[]?\s*([^)\]]*?)\s*[)\]]?")
 #: Number of samples and step in the fourth line of an AT2 file, of the newer and older form.
 _AT2 = re.compile(r"(\d+)[^\d.]+(\d*\.?\d+(?:[eE][+-]?\d+)?)")
+
+
+class _Column(NamedTuple):
+    """Column of a file: unit, "" for none, and cells as words."""
+
+    unit: str
+    cells: Any
 
 
 def from_csv(
@@ -35,12 +46,15 @@ def from_csv(
     *,
     unit: str | None = None,
     correct_baseline: bool = False,
+    highpass: float | None = None,
+    resample: float | None = None,
 ) -> Signal:
     """Signal from a file of columns, such as a measured motion of a base.
 
-    Columns are separated by tabs, semicolons or commas; with the first two, decimals may have a
-    comma. The first line that is not empty and does not begin with "#" names them, such as time_s,
-    "Time [ms]", displacement_mm, "Vel (cm/s)" or "Acc (g)"; times without a unit are seconds.
+    Columns are separated by tabs, semicolons, commas or spaces; decimals may have a comma. The last
+    line above the numbers names them, such as ``time_s,ax`` or ``Time [ms];Acceleration X (g)``;
+    below it may be a line of units, above it anything. The time is the column whose name says so,
+    in seconds without a unit, or else the first one.
 
     Parameters
     ----------
@@ -49,33 +63,33 @@ def from_csv(
     column : str, optional
         Name of the column to take; needed where there are several that hold a motion or a force.
     unit : str, optional
-        Unit of that column, where its name has none, as in ``"g"`` or ``"m_s2"``.
+        Unit of that column, as in ``"g"`` or ``"m/s^2"``, whatever the file says.
     correct_baseline : bool, default False
         For an acceleration: subtract a straight line so that the motion ends at rest where it
         began, as in ``from_samples``; right for a record with an offset, wrong for a shock.
+    highpass : float, optional
+        Frequency below which the record is drift [Hz], as in ``from_samples``.
+    resample : float, optional
+        Step of even times for a record with gaps or uneven ones [s], as in ``from_samples``.
     """
     name = path_name("path", path)
     table = _table(name)
-    units = {one: _unit_of(one) for one in table.columns}
-    times = [one for one, unit in units.items() if unit in _TIMES or _is_time(one)]
-    others = [one for one in units if one not in times]
-    motions = [one for one in others if units[one] in UNITS] or others
-    if column is not None:
-        motions = [choice("column", column, others)]
-    if len(times) != 1 or len(motions) != 1:
-        raise InputError(
-            f"column must say which one is meant where {name} has not one time and one motion or "
-            f"force, such as time_s and acceleration_g, got {shown(column)} and "
-            f"{shown(list(table.columns))}"
-        )
-    wanted, (time,) = motions[0], times
-    what, factor = _factor(f"column {wanted} of {name}", units[wanted], unit)
-    seconds = _TIMES.get(units[time], 1.0) * _numbers(name, f"column {time}", table[time])
-    values = factor * _numbers(name, f"column {wanted}", table[wanted])
-    return _signal(name, wanted, seconds, values, what, correct_baseline)
+    named = [one for one in table if table[one].unit in _TIMES or one.lower() in ("t", "time")]
+    time = (named or list(table))[0]
+    wanted = _motion(name, [one for one in table if one not in (time, *named)], table, column)
+    what, factor = _factor(f"column {wanted} of {name}", table[wanted].unit, unit)
+    seconds = _TIMES.get(table[time].unit, 1.0) * _numbers(name, time, table[time].cells)
+    values = factor * _numbers(name, wanted, table[wanted].cells)
+    options = {"correct_baseline": correct_baseline, "highpass": highpass, "resample": resample}
+    made = _signal(name, wanted, seconds, values, of=what, **options)
+    if named:
+        return made
+    return replace(made, treated=f"time [s] by the first column, {time}; {made.treated}")
 
 
-def from_at2(path: FileName, *, correct_baseline: bool = False) -> Signal:
+def from_at2(
+    path: FileName, *, correct_baseline: bool = False, highpass: float | None = None
+) -> Signal:
     """Signal from a record of the PEER ground motion database, an acceleration in g.
 
     Parameters
@@ -84,12 +98,11 @@ def from_at2(path: FileName, *, correct_baseline: bool = False) -> Signal:
         AT2 file: four lines of head, of which the last has the number of samples and the step.
     correct_baseline : bool, default False
         As in ``from_csv``.
+    highpass : float, optional
+        As in ``from_csv``.
     """
     name = path_name("path", path)
-    try:
-        lines = Path(name).read_text(encoding="latin-1").splitlines()
-    except OSError as error:
-        raise InputError(f"{name} must be a file that can be read: {error.strerror}") from None
+    lines = _text(name).splitlines()
     match = _AT2.search(lines[3]) if len(lines) > 3 else None
     if match is None or "g" not in lines[2].lower().split("units of")[-1]:
         raise InputError(
@@ -101,78 +114,126 @@ def from_at2(path: FileName, *, correct_baseline: bool = False) -> Signal:
     if len(cells) != count:
         raise InputError(f"{name} must hold {count} samples, as it says, got {len(cells)}")
     values = UNITS["g"][1] * _numbers(name, "accelerations", cells)
-    time = step * np.arange(count)
-    return _signal(name, "record", time, values, "acceleration", correct_baseline)
+    options = {"correct_baseline": correct_baseline, "highpass": highpass}
+    return _signal(name, "record", step * np.arange(count), values, of="acceleration", **options)
 
 
-def _signal(name, column, time, values, what, correct_baseline):
-    """Signal of a quantity; InputError with the name of its file."""
+def _signal(name, column, time, values, **options):
+    """Signal of samples; InputError with the name of their file."""
     try:
-        made = from_samples(time, values, of=what, correct_baseline=correct_baseline)
+        made = from_samples(time, values, **options)
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     return replace(made, label=f"{column} of {name}")
 
 
-def _table(name: str) -> Any:
-    """Columns of a file as a DataFrame of words by their names, decimal commas as points."""
+def _text(name: str) -> str:
+    try:
+        found = Path(name).read_bytes()
+    except OSError as error:
+        raise InputError(f"{name} must be a file that can be read: {error.strerror}") from None
+    try:
+        return found.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return found.decode("latin-1")
+
+
+def _table(name: str) -> dict[str, _Column]:
+    """Columns of a file by their names."""
     import pandas
 
-    layout: dict[str, Any] = {"comment": "#", "index_col": False, "dtype": str}
+    lines = [line for line in _text(name).splitlines() if line.strip()]
+    between = next((one for one in "\t;," if one in "".join(lines[-1:])), " ")
     try:
-        text = Path(name).read_text(encoding="utf-8-sig")
-        lines = (line for line in text.splitlines() if line.strip() and line[0] != "#")
-        between = next((one for one in "\t;" if one in next(lines, "")), ",")
-        found = pandas.read_csv(name, encoding="utf-8-sig", sep=between, **layout)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{name} must be a CSV file that can be read: {reason}") from None
-    if between != ",":
-        found = found.apply(lambda cells: cells.str.replace(",", "."))
-    return found.rename(columns=str.strip)
+        rows = csv.reader(lines, delimiter=between, skipinitialspace=True)
+        above = list(takewhile(lambda row: len(row) < 2 or math.isnan(_number(row[0])), rows))
+        cells = pandas.read_csv(
+            io.StringIO("\n".join(lines[len(above) :])),
+            sep=between,
+            header=None,
+            dtype=str,
+            keep_default_na=False,
+            skipinitialspace=True,
+            comment="#",
+        )
+    except (csv.Error, ValueError) as error:
+        raise InputError(
+            f"{name} must be a file of columns, with two numbers or more in a line: {error}"
+        ) from None
+    names, units = _heads(above, cells.shape[1])
+    return {
+        name: _Column(_unit_of(unit or name), cells[k])
+        for k, (name, unit) in enumerate(zip(names, units))
+    }
+
+
+def _heads(above: list[list[str]], count: int) -> tuple[list[str], list[str]]:
+    """Names of so many columns, each another, and units in a line of their own, of lines above."""
+    fits = [row for row in above if len(row) == count]
+    # A remark may stand between the names and the numbers, and may hold the names.
+    fits = [row for row in fits if row[0][:1] != "#"] or fits
+    is_units = len(fits) > 1 and all(_spelled(cell) in (*UNITS, *_TIMES, "") for cell in fits[-1])
+    units = fits.pop() if is_units else [""] * count
+    names: list[str] = []
+    for k, cell in enumerate(fits[-1] if fits else units):
+        own = cell.strip("# ") or f"column {k + 1}"
+        names.append(f"{own} {k + 1}" if own in names else own)
+    return names, units
+
+
+def _motion(name: str, others: list[str], table: Any, column: Any) -> str:
+    """The column that is meant, or the only one with the unit of a motion or force, or at all."""
+    if column is not None:
+        return choice("column", column, others)
+    fits = [one for one in others if table[one].unit] or others
+    if len(fits) != 1:
+        raise InputError(
+            f"column must say which one is meant where {name} has not one motion or force beside "
+            f"a time, got None and {shown(list(table))}"
+        )
+    return fits[0]
+
+
+def _spelled(text: str) -> str:
+    """A header in small letters, units as in UNITS: "m/s^2", "m/s²" and "m s-2" are one."""
+    plain = re.sub(r"[\^*]", "", normalize("NFKC", text)).replace("μ", "u")
+    plain = re.sub(r"\W+", "_", re.sub("[-−]2", "2", plain)).strip("_").replace("_s_s", "_s2")
+    return plain if plain.split("_")[-1] in ("N", "kN") else plain.lower()
 
 
 def _unit_of(header: str) -> str:
-    """Unit that a header names, "" for none."""
-    match = _HEADER.fullmatch(header)
-    return _spelled(match[1]) if match else ""
-
-
-def _is_time(header: str) -> bool:
-    """Whether a column without a unit is a time."""
-    return header.lower() in ("t", "time")
-
-
-def _spelled(unit: str) -> str:
-    """A unit as UNITS spells it: "m/s^2", "m/s²" and "m_s2" are one."""
-    plain = unit.replace("²", "2").replace("^", "").replace("µ", "u").replace("/", "_")
-    return plain if plain == "N" or plain == "kN" else plain.lower().replace("_s_s", "_s2")
+    """The longest unit in which a header ends, "" for none."""
+    spelled = f"_{_spelled(header)}"
+    return max((u for u in (*UNITS, *_TIMES) if spelled.endswith(f"_{u}")), key=len, default="")
 
 
 def _factor(where: str, own: str, given: str | None) -> tuple[str, float]:
     """What a column holds, and SI units in 1 of it; InputError where nothing names its unit."""
     if given is not None:
-        given = choice("unit", _spelled(given) if isinstance(given, str) else given, UNITS)
-    own = own if own in UNITS else ""
-    if own and given and given != own:
-        raise InputError(f"unit must be None or {own!r} for {where}, got {given!r}")
-    if not (own or given):
+        own = choice("unit", _spelled(given) if isinstance(given, str) else given, UNITS)
+    if not own:
         raise InputError(
             f"unit must be one of {', '.join(UNITS)} for {where}, whose name has none, got None"
         )
-    return UNITS[own or str(given)]
+    return UNITS[own]
 
 
-def _numbers(name, where, cells):
-    """Cells as numbers; InputError that names the first that is none."""
+def _number(cell: Any) -> float:
+    """A cell as a number, NaN where it is none; decimals may have a comma."""
     try:
-        found = np.asarray(cells, object).astype(np.float64)
-    except ValueError as error:
-        raise InputError(f"{name} must hold numbers in {where}: {error}") from None
+        return float(str(cell).replace(",", "."))
+    except ValueError:
+        return math.nan
+
+
+def _numbers(name: str, column: str, cells: Iterable[Any]) -> np.ndarray:
+    """Cells as numbers; InputError that names the first that is none."""
+    given = list(cells)
+    found = np.array([_number(one) for one in given])
     bad = np.flatnonzero(~np.isfinite(found))
     if len(bad):
         raise InputError(
-            f"{name} must hold a finite number in {where} of row {bad[0] + 1}, "
-            f"got {shown(np.asarray(cells, object)[bad[0]])}"
+            f"{name} must hold a finite number in {column} of row {bad[0] + 1}, "
+            f"got {shown(given[bad[0]])}"
         )
     return found

@@ -17,7 +17,7 @@ import numpy as np
 
 from ca_damper.excitation.signal import MOST_NODES, Signal, end_slope, integral, nodes, spline
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, flag, told_apart
+from taichi_dem.kit.validation import between, choice, flag, told_apart
 
 #: What samples are of: the signal itself, its first or its second derivative.
 OF = ("value", "velocity", "acceleration")
@@ -25,6 +25,8 @@ OF = ("value", "velocity", "acceleration")
 _UNEVEN = 0.1
 #: Distance that is rounding, as a share of the largest time.
 _ROUNDED = 1e-12
+#: Steps from sample to sample that are a gap.
+_GAP = 1.5
 #: Samples that a cycle needs, and the share of the power in slower cycles.
 SAMPLES_A_CYCLE, POWER_SHARE = 4.0, 0.99
 #: Nodes from sample to sample of what is integrated.
@@ -37,13 +39,15 @@ def from_samples(
     *,
     of: str = "value",
     correct_baseline: bool = False,
+    highpass: float | None = None,
+    resample: float | None = None,
 ) -> Signal:
     """Signal through measured samples; its own time counts from the first of them.
 
     Parameters
     ----------
     time_s : array_like
-        Evenly spaced times [s], shape (samples,).
+        Ascending times [s], shape (samples,); evenly spaced unless ``resample`` is given.
     values : array_like
         Samples, shape (samples,), of the kind that ``of`` names.
     of : str, default "value"
@@ -54,6 +58,14 @@ def from_samples(
         Subtract from an acceleration the straight line that makes the motion end at rest where it
         began: for a record with an offset, which integrates to a large drift. Do not use it for a
         shock, which changes the speed for good. A report says what was done.
+    highpass : float, optional
+        Frequency below which the samples are drift [Hz], from one cycle in the record to a quarter
+        of the sampling rate: SciPy's Butterworth filter of order two, forwards and backwards, whose
+        gain at f is 1 / (1 + (highpass / f)^4).
+    resample : float, optional
+        Step [s] of even times at which the cubic spline through the samples is taken, at most the
+        usual step between them. A report names each gap; one longer than a quarter of the
+        structure's period is refused where the structure is known.
 
     Returns
     -------
@@ -72,12 +84,56 @@ def from_samples(
     times, samples = nodes("time_s", time_s), nodes("values", values)
     if len(times) != len(samples):
         raise InputError(f"values must be {len(times)}, as many as times, got {len(samples)}")
+    done, gap = [], 0.0
+    if resample is not None:
+        times, samples, gap, words = _resampled(times, samples, resample)
+        done.append(words)
     step = float(times[-1] - times[0]) / (len(times) - 1)
-    evened = _evened(times, step)
+    done.append(_evened(times, step))
+    if highpass is not None:
+        samples, words = _without_drift(step, samples, highpass)
+        done.append(words)
     _check_spectrum(step, samples)
-    made, treated = _integrated(step, samples, of, correct_baseline)
-    treated = "; ".join(filter(None, (evened, treated)))
-    return replace(made, treated=treated, apart=step)
+    made, words = _integrated(step, samples, of, correct_baseline)
+    return replace(made, treated="; ".join(filter(None, (*done, words))), apart=step, gap=gap)
+
+
+def _resampled(times, samples, step):
+    """Even times, the spline through the samples there, the longest gap [s], and words."""
+    from scipy.interpolate import CubicSpline
+
+    steps = np.diff(times)
+    if not steps.min() > 0.0:
+        k = int(steps.argmin()) + 1
+        raise InputError(
+            f"times must ascend, got {times[k]:.9g} s after {times[k - 1]:.9g} s in sample {k + 1}"
+        )
+    usual = float(np.median(steps))
+    least = float(times[-1] - times[0]) / MOST_NODES
+    step = between("resample", step, least, max(least, usual))
+    gaps = steps > _GAP * usual
+    each = [f"{one:.4g} s after {at:.6g} s" for one, at in zip(steps[gaps], times[:-1][gaps])]
+    count = int((times[-1] - times[0]) / step * (1.0 + _ROUNDED))
+    even = times[0] + step * np.arange(count + 1)
+    words = f"taken every {step:.4g} s from a spline, gaps: {', '.join(each) or 'none'}"
+    return even, CubicSpline(times, samples)(even), steps[gaps].max(initial=0.0), words
+
+
+def _without_drift(step, samples, highpass):
+    """Samples after a high-pass filter that keeps phases, and words."""
+    from scipy import signal
+
+    between("highpass", highpass, 1.0 / (step * (len(samples) - 1)), 0.25 / step)
+    sections = signal.butter(2, highpass, "highpass", fs=1.0 / step, output="sos")
+    # Mirrored at its ends, the record keeps its mean there; three cycles let the filter forget.
+    around = min(len(samples) - 1, int(3.0 / (step * highpass)))
+    left = signal.sosfiltfilt(sections, samples, padtype="even", padlen=around)
+    mean, taken = samples.mean(), (samples - left).std()
+    words = (
+        f"high-pass filtered at {highpass:g} Hz, which takes a mean of {mean:.3g} and "
+        f"{taken:.3g} RMS of {samples.std():.3g}"
+    )
+    return left, words
 
 
 def _integrated(step, samples, of, correct_baseline):
@@ -119,7 +175,7 @@ def _evened(times, step):
         raise InputError(
             f"times must ascend evenly, to {_UNEVEN:g} of their step of {usual:g} s, got "
             f"{times[k]:.9g} s after {times[k - 1]:.9g} s in sample {k + 1}: read one part at a "
-            "time, or take values at even times from scipy.interpolate.CubicSpline"
+            f"time, or give resample={usual:.4g}"
         )
     is_even = late.max() <= _ROUNDED * max(step, abs(times[0]), abs(times[-1]))
     return "" if is_even else f"times evened by up to {late.max():.2g} s"

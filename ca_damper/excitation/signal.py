@@ -52,6 +52,8 @@ class Signal:
         Treatment of samples before the signal was made, in words.
     apart : float, default 0.0
         Time between the samples that it was made of [s]; 0 for a formula.
+    gap : float, default 0.0
+        Longest gap between samples that was bridged [s].
 
     References
     ----------
@@ -64,6 +66,7 @@ class Signal:
     label: str = "signal"
     treated: str = ""
     apart: float = 0.0
+    gap: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "step", positive("step", self.step))
@@ -130,14 +133,11 @@ def _unless_tiny(values, size):
 
 def spline(step: float, value: np.ndarray, label: str) -> Signal:
     """Signal through values at the nodes."""
-    # m[k-1] + 4 m[k] + m[k+1] = 6 (y[k-1] - 2 y[k] + y[k+1]) / h^2 = r[k] inside; "not a knot"
-    # makes the third derivative continuous at the first and last inner node, where 6 m = r.
-    value = nodes("value", value)
-    right = (6.0 * (value[:-2] - 2.0 * value[1:-1] + value[2:]) / step**2).tolist()
-    bend = np.empty(len(value))
-    bend[1:-1] = _inner(right)
-    bend[0], bend[-1] = 2.0 * bend[1] - bend[2], 2.0 * bend[-2] - bend[-3]
-    return Signal(step, value, bend, label)
+    from scipy.interpolate import CubicSpline
+
+    # In steps, whose number is exact.
+    value, count = nodes("value", value), np.arange(len(value))
+    return Signal(step, value, CubicSpline(count, value)(count, 2) / step**2, label)
 
 
 def integral(step: float, bend: np.ndarray, label: str) -> Signal:
@@ -152,25 +152,6 @@ def integral(step: float, bend: np.ndarray, label: str) -> Signal:
 def end_slope(signal: Signal) -> float:
     """First derivative at the end of a signal."""
     return float(signal.at(np.array([signal.duration]))[1][0])
-
-
-def _inner(right):
-    """Second derivatives at the inner nodes, by elimination without a search for pivots."""
-    # First and last equation are 6 m = r, so that those between see known neighbours.
-    first, last = right[0] / 6.0, right[-1] / 6.0
-    if len(right) == 2:
-        return [first, last]
-    middle = right[1:-1]
-    middle[0] -= first
-    middle[-1] -= last
-    factors, sums = [0.25], [0.25 * middle[0]]
-    for r in middle[1:]:
-        pivot = 1.0 / (4.0 - factors[-1])
-        factors.append(pivot)
-        sums.append((r - sums[-1]) * pivot)
-    for k in range(len(sums) - 2, -1, -1):
-        sums[k] -= factors[k] * sums[k + 1]
-    return [first, *sums, last]
 
 
 def nodes(name: str, values: ArrayLike) -> np.ndarray:

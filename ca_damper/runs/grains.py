@@ -1,7 +1,8 @@
 """Grains in boxes of their size, and the boxes that hold one mass of them."""
 
+import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -26,11 +27,43 @@ class Grains(NamedTuple):
     width: float
     height: float
 
+    def __str__(self) -> str:
+        sizes = (self.diameter, self.width, self.height, self.clearance)
+        size, width, height, gap = (f"{1e3 * one:.3g}" for one in sizes)
+        box = f"{width} x {height} mm, clearance {gap} mm"
+        return f"{self.particles} grains of {size} mm in a box of {box}"
+
+    @property
+    def settled(self) -> float:
+        """Height of the settled grains [m]."""
+        return self.diameter * self.particles / _cells(self.width, self.diameter)
+
     @property
     def clearance(self) -> float:
         """Distance from the settled grains to the lid [m]."""
-        columns = int(self.width / self.diameter * (1.0 + 1e-9))
-        return self.height - self.diameter * self.particles / columns
+        return self.height - self.settled
+
+    def with_clearance(self, clearance: float) -> "Grains":
+        """The grains in a box as high as a clearance needs [m]."""
+        return self._replace(height=self.settled + clearance)
+
+    def between_neighbours(self, tried: Iterable["Grains"]) -> list["Grains"]:
+        """Boxes half-way to the next lower and higher one of as many grains that was tried."""
+        rows = sorted(round(one.height / one.diameter) for one in tried if one[:4] == self[:4])
+        k = rows.index(round(self.height / self.diameter))
+        near = itertools.pairwise(rows[max(0, k - 1) : k + 2])
+        new = {(low + high) // 2 for low, high in near}.difference(rows)
+        return [self._replace(height=row * self.diameter) for row in sorted(new)]
+
+    def with_errors(self, share: float) -> Iterator[tuple[str, "Grains"]]:
+        """Boxes with one error of manufacture, all else as it was, and its name."""
+        for by in (1.0 + share, 1.0 - share):
+            change = f"{100.0 * (by - 1.0):+.3g} %"
+            yield f"clearance {change}", self.with_clearance(by * self.clearance)
+            yield f"mass {change}", self._replace(mass=by * self.mass)
+            other = self._replace(diameter=by * self.diameter)
+            if other.diameter <= self.width:
+                yield f"size {change}", other.with_clearance(self.clearance)
 
     def put_into(self, filling: Any) -> Any:
         """The filling with these grains in this box."""
@@ -54,42 +87,32 @@ def diameter_of(mass: float, density: float) -> float:
     return (6.0 * mass / (math.pi * density)) ** (1.0 / 3.0)
 
 
+def _cells(length: float, size: float) -> int:
+    """Whole cells in a length."""
+    return int(length / size * (1.0 + 1e-9))
+
+
 def boxes_of(
     mass: float, counts: Sequence[int], box: Any, density: float, heights: int
 ) -> list[Grains]:
     """Boxes to look at: grains of one mass in whole cells of their size."""
     width, height = pair_of("box", box, "an inner width and a greatest inner height [m]", positive)
-    found = []
+    found, enough = [], []
     for count in counts:
         own = mass / count
         size = diameter_of(own, density)
-        columns, most = (int(one / size * (1.0 + 1e-9)) for one in (width, height))
+        columns, most = _cells(width, size), _cells(height, size)
         least = 1 + math.ceil(count / max(1, columns))
-        if columns > 0 and most >= least:
+        if columns and most >= least:
             rows = np.unique(np.linspace(least, most, heights).round().astype(int))
             found += [Grains(count, own, size, columns * size, row * size) for row in rows]
+        enough.append((max(width, size), least * size))
     if not found:
+        # Upwards to a tenth of a millimetre, so that it does.
+        wide, high = (math.ceil(1e4 * one - 1e-6) / 1e4 for one in min(enough))
         raise InputError(
-            f"box must hold {mass:g} kg of grains with a layer free above them, got "
-            f"{shown(box)} m for {listed(counts)} grains"
+            f"box must hold {mass:g} kg of grains with a layer free above them, in one sheet that "
+            f"is a grain deep: at least ({wide:g}, {high:g}) m, got {shown(box)} m for "
+            f"{listed(counts)} grains"
         )
     return found
-
-
-def shifted(best: Grains, share: float) -> Iterator[tuple[str, Grains]]:
-    """Boxes with an error of manufacture, and its name, where the grains still fit."""
-    # Balls of one density weigh by the cube of their size.
-    for sign in (1.0, -1.0):
-        by = 1.0 + sign * share
-        taller = best.height + sign * share * best.clearance
-        yield f"clearance {_change(by)}", best._replace(height=taller)
-        count = max(1, round(by * best.particles))
-        more = _change(count / best.particles)
-        yield f"number {more}, mass {more}", best._replace(particles=count)
-        other = best._replace(diameter=by * best.diameter, mass=by**3 * best.mass)
-        if other.clearance > 0.0:
-            yield f"size {_change(by)}, mass {_change(by**3)}", other
-
-
-def _change(factor):
-    return f"{100.0 * (factor - 1.0):+.3g} %"

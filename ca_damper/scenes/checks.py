@@ -81,9 +81,15 @@ def check_within(excitation: Excitation, ends: np.ndarray) -> None:
 
 
 def sampling_found(excitation: Excitation, frequencies: np.ndarray) -> tuple[str, ...]:
-    """Sentences about samples that are too few for the frequencies of a structure."""
-    sentences = []
+    """Sentences on samples too few for frequencies of a structure; InputError for long gaps."""
+    sentences, highest = [], float(frequencies.max(initial=0.0))
     for role, signal in excitation.signals.items():
+        if 4.0 * signal.gap * highest > 1.0:
+            got, most = told_apart(signal.gap, 0.25 / highest)
+            raise InputError(
+                f"gaps of the {role} must be at most {most} s, a quarter of the structure's period "
+                f"at {highest:.4g} Hz, got {got} s in {signal.label}"
+            )
         few = np.unique(frequencies[frequencies * signal.apart * _ENOUGH > 1.0 + 1e-9])
         if len(few):
             sentences.append(

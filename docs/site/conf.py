@@ -43,6 +43,7 @@ CONTENTS = {
         "docs/strength_tests",
         "docs/tunnel",
         "docs/damper_engineering",
+        "docs/measured_bracket",
         "docs/results",
         "docs/units",
         "docs/gpu",

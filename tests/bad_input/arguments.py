@@ -217,7 +217,7 @@ def _of_damper():
         "Goal": {"ratios": (1.0,)},
         "Goal.values": {"response": response()},
         "damper_map": {"filling": ca.Automaton(), "particles": 10, "clearances": 0.024},
-        "best_damper": {"structure": ca.Oscillator(), **of_damper, **quick},
+        "best_damper": {"oscillator": ca.Oscillator(), **of_damper, **quick},
         "solve_response": {"goal": ca.goals.rms_at(1.0), "tolerance": 0.5, "budget_s": 60.0},
     }
 

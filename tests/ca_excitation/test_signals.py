@@ -1,9 +1,11 @@
 """Signals are what was asked for: order of splines, integrals, sweeps, spectra, files."""
 
+import contextlib
+
 import numpy as np
 import pytest
 
-from ca_damper import InputError, excitation
+from ca_damper import Batch, InputError, Oscillator, RigidMass, SceneTable, excitation
 from ca_damper.excitation.signal import integral, spline
 
 OMEGA = 2.0 * np.pi * 3.0
@@ -92,35 +94,125 @@ def test_a_file_is_read_by_the_units_of_its_columns(tmp_path):
         excitation.from_csv(both)
 
 
+#: Lines above the numbers: what separates cells, decimals, SI units in 1, and what has to be given.
 HEADS = {
-    "Time (s)\tAcc (g)": ("\t", ".", 9.80665),
-    "time [s];acceleration [m/s²]": (";", ",", 1.0),
-    "t;a (cm/s^2)": (";", ".", 1e-2),
-    "Time_s,acc_gal": (",", ".", 1e-2),
+    "Time (s)\tAcc (g)": ("\t", ".", 9.80665, {}),
+    "time [s];acceleration [m/s²]": (";", ",", 1.0, {}),
+    "t;a (cm/s^2)": (";", ".", 1e-2, {}),
+    "Time_s,acc_gal": (",", ".", 1e-2, {}),
+    "t,ax": (",", ".", 9.80665, {"unit": "g"}),
+    "t,ax ": (",", ".", 1e-3, {"column": "ax", "unit": "mm/s²"}),
+    "time_s,acc_x_g": (",", ".", 9.80665, {}),
+    "Time,Acceleration X (g)": (",", ".", 9.80665, {}),
+    "Zeit [s];Beschleunigung [m/s²]": (";", ",", 1.0, {}),
+    "# time_s,acceleration_g": (",", ".", 9.80665, {}),
+    "Time,Acc Z\ns,m/s2": (",", ".", 1.0, {}),
+    "Zeit\tKanal 1\n[s]\t[mg]": ("\t", ",", 9.80665e-3, {}),
+    "Logger 7, made 3 May\n\nrate;100 Hz\nt;a_m_s2\n# checked; twice": (";", ".", 1.0, {}),
+    "time_s,acc_m_s2": (",", ".", 9.80665, {"unit": "g"}),
+    'time_s,"Acceleration, X (g)"': (",", ".", 9.80665, {}),
 }
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
 @pytest.mark.parametrize("head", HEADS)
-def test_records_of_many_makes_are_one_acceleration(tmp_path, head):
-    """Tabs, semicolons, decimal commas, and the unit by its header: the same bits as by samples."""
-    between, point, factor = HEADS[head]
+def test_records_of_many_makes_are_one_acceleration(tmp_path, head, encoding):
+    """The same bits as by samples. What is given counts in place of what the file says."""
+    between, point, factor, given = HEADS[head]
     rows = [between.join(f"{x:.6f}".replace(".", point) for x in pair) for pair in GOOD]
     path = tmp_path / "record.txt"
-    path.write_text("\n".join([head, *rows]), encoding="utf-8")
+    path.write_text("\n".join([head, *rows]), encoding=encoding)
     time, values = (np.array([float(f"{x:.6f}") for x in column]) for column in zip(*GOOD))
     wanted = excitation.from_samples(time, factor * values, of="acceleration")
-    assert np.array_equal(excitation.from_csv(path).value, wanted.value)
+    assert np.array_equal(excitation.from_csv(path, **given).value, wanted.value)
+
+
+def test_a_time_without_a_name_is_the_first_column_which_is_told(tmp_path):
+    named, other = (
+        excitation.from_csv(written(tmp_path / "a.csv", GOOD, f"{head},acc_g\n"))
+        for head in ("t", "Temps")
+    )
+    assert np.array_equal(named.value, other.value)
+    assert "first column" in other.treated and "first column" not in named.treated
 
 
 def test_a_unit_that_the_header_lacks_is_asked_for(tmp_path):
     path = written(tmp_path / "bare.csv", GOOD, "time,acc\n")
-    with pytest.raises(InputError, match=r"unit must be one of .* for column acc of"):
+    with pytest.raises(InputError, match=r"unit must be one of .* for column acc of .* got None"):
         excitation.from_csv(path)
-    made = excitation.from_csv(path, unit="m/s^2")
-    wanted = excitation.from_samples(*zip(*GOOD), of="acceleration")
-    assert np.array_equal(made.value, wanted.value)
-    with pytest.raises(InputError, match="unit must be None or 'mm' for column displacement_mm"):
-        excitation.from_csv(written(tmp_path / "c.csv", GOOD), unit="m")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "must be a file of columns"),
+        ("time_s,acc_g\n", "must be a file of columns"),
+        ("time_s,acc_g\n0.0,1.0\n0.1,\n", r"must hold a finite number in acc_g of row 2, got ''"),
+        ("time_s,acc_g\n0.0,1.0\n0.1,one\n", "finite number in acc_g of row 2, got 'one'"),
+        ("time_s,acc_g\n0.0,1.0\n0.1,1.0,2.0\n", "must be a file of columns"),
+    ],
+)
+def test_a_file_without_numbers_is_refused_in_a_sentence(tmp_path, text, words):
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        excitation.from_csv(tmp_path / "bad.csv")
+
+
+def with_gaps(step=0.01, count=400):
+    """A sine of 3 Hz at uneven times, without some of its samples."""
+    kept = np.delete(np.arange(count), [*range(50, 54), *range(200, 202)])
+    time = step * kept
+    return time, np.sin(OMEGA * time)
+
+
+def test_a_gap_is_bridged_by_a_cubic_and_each_is_named():
+    """A cubic spline is off by 5/384 of (w h)^4 at most, h the longest step (Hall 1968)."""
+    time, values = with_gaps()
+    made = excitation.from_samples(time, values, resample=0.01)
+    fine = made.step * np.arange(len(made.value))
+    off = np.abs(made.value - np.sin(OMEGA * fine))
+    assert made.step == pytest.approx(0.01) and made.gap == pytest.approx(0.05)
+    assert off.max() < 5.0 / 384.0 * (0.05 * OMEGA) ** 4
+    assert off[100:150].max() < 5.0 / 384.0 * (0.01 * OMEGA) ** 4
+    assert all(one in made.treated for one in ("0.05 s after 0.49 s", "0.03 s after 1.99 s"))
+    for wrong in (0.02, 0.0, 1e-12):
+        with pytest.raises(InputError, match=r"^resample must be a number from .* to 0.01, got"):
+            excitation.from_samples(time, values, resample=wrong)
+    with pytest.raises(InputError, match=r"times must ascend, got 0.48 s after 0.49 s in"):
+        excitation.from_samples(
+            np.insert(time, 50, 0.48), np.insert(values, 50, 0.0), resample=0.01
+        )
+
+
+@pytest.mark.parametrize(("frequency", "holds"), [(4.9, True), (5.1, False)])
+def test_a_gap_longer_than_a_quarter_of_the_period_is_refused(frequency, holds):
+    """0.05 s are a quarter at 5 Hz."""
+    motion = excitation.from_samples(*with_gaps(), resample=0.01)
+    stiffness = Oscillator().mass * (2.0 * np.pi * frequency) ** 2
+    table = SceneTable(0, 1, 1e-3, 1.0, 0.0, Oscillator().mass, stiffness)
+    refused = pytest.raises(InputError, match=r"gaps of the base must be at most .* got 0.05\d* s")
+    with contextlib.nullcontext() if holds else refused:
+        Batch(RigidMass(), table, excitation=motion)
+
+
+def test_a_high_pass_has_the_gain_of_butterworth_both_ways_and_keeps_phases():
+    """1 / (1 + (tan(pi c h) / tan(pi f h))^4), c the given frequency, by the bilinear rule.
+
+    Cosines that end on crests go on as themselves in the mirror, where the filter forgets three
+    cycles of c away by exp(-sqrt(2) pi c t).
+    """
+    step, edge = 0.01, 0.5
+    time, wanted, samples = step * np.arange(4001), 0.0, 3.0
+    for hertz in (0.25, 2.0):
+        wave = np.cos(2.0 * np.pi * hertz * time)
+        ratio = np.tan(np.pi * edge * step) / np.tan(np.pi * hertz * step)
+        wanted, samples = wanted + wave / (1.0 + ratio**4), samples + wave
+    made = excitation.from_samples(time, samples, highpass=edge)
+    assert made.value == pytest.approx(wanted, abs=4.0 * np.exp(-3.0 * np.sqrt(2.0) * np.pi))
+    assert "high-pass" in made.in_words("m")
+    for wrong in (0.02, 25.1, "low"):
+        with pytest.raises(InputError, match=r"^highpass must be a number from 0.025 to 25, got"):
+            excitation.from_samples(time, samples, highpass=wrong)
 
 
 @pytest.mark.parametrize("head", ["NPTS=   200, DT=   .0100 SEC", "  200   .0100  NPTS, DT"])
