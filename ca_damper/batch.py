@@ -410,17 +410,28 @@ class Batch(LoadedScenes):
         """Read the whole state, to keep it while another batch uses the engine."""
         return self.memory.read(), self.saved()
 
-    def take_up(self, aside: tuple[dict[str, np.ndarray], ...]) -> None:
-        """Continue from a state instead of a start, with the same bits.
+    def take_up(self, aside: tuple[dict[str, np.ndarray], ...], rows: Any = None) -> None:
+        """Continue from a state instead of a start.
 
         Parameters
         ----------
         aside : tuple
-            State that ``aside`` of a batch with the same arguments has returned.
+            State that ``aside`` of a batch of the same filling has returned.
+        rows : sequence of int, optional
+            Scene of that batch which each scene of this one goes on from, at the end of a cycle:
+            they may differ by their steps. None: all, with the same bits.
         """
         arrays, saved = aside
-        self.memory.write(arrays)
-        self.resume(saved)
+        if rows is None:
+            self.memory.write(arrays)
+            self.resume(saved)
+        else:
+            own = {name: one[rows] for name, one in arrays.items() if name.startswith("scenes/")}
+            self.memory.write({**self.memory.read(), **own})
+            self._load_pace()
+            self.engine.coupling.renew()
+            _, dt, origin = saved["pace"][:, rows]
+            self.time_origin = origin + self._read_status()[0] * (dt - self.table.column("dt"))
         self._started, self.going_on = True, False
 
     def report(self) -> Report:

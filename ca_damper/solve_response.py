@@ -79,7 +79,8 @@ def solve_response(
 
     Notes
     -----
-    Runs begin at rest. The same question gets the same bits, unless a budget ends it.
+    Grains begin at rest, masses that are fixed in their steady state; at half the step a scene goes
+    on from where it was. The same question gets the same bits, unless a budget ends it.
 
     Examples
     --------

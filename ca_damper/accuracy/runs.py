@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ca_damper.batch import Batch
+from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.measures import COLUMNS, Cycles
 from ca_damper.report.steady_state import SteadyPart, steady_part
 from ca_damper.runs.response import measures_of
-from ca_damper.scenes.clock import steps_per_cycle
+from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.bars.runs import BudgetSpent
 from taichi_dem.kit.progress import Listener
@@ -21,6 +22,8 @@ from taichi_dem.kit.progress import Listener
 #: Scenes of a batch and cycles of a run: an engine has room for so many at least, so that further
 #: batches of the same filling compile nothing.
 SCENES, CYCLES = 64, 32
+#: Fillings that begin in their steady state.
+GLUED = Empty, RigidMass
 # Cycles of a scene after which it is taken as it is, with what its drift is known to be.
 _MOST_CYCLES = 20_000
 
@@ -32,12 +35,22 @@ class SceneKey(NamedTuple):
     seed: int
     dt: float
 
+    @property
+    def coarser(self) -> "SceneKey":
+        """The same scene at twice the step."""
+        return self._replace(dt=2.0 * self.dt)
+
 
 @dataclass(eq=False)
 class _Home:
-    """Scenes of one batch; aside: their state while another batch runs."""
+    """Scenes of one batch; aside: their state while another batch runs.
+
+    source, rows: batch and scenes that they go on from, None where they begin anew.
+    """
 
     table: SceneTable
+    source: Any
+    rows: list[int]
     aside: Any = None
 
 
@@ -48,7 +61,7 @@ class SceneRuns:
         self, filling: Any, particles: int, oscillator: Oscillator, progress: Listener | None
     ):
         self.filling, self.particles, self.oscillator = filling, particles, oscillator
-        self.progress = progress
+        self.progress, self.start = progress, "rigid" if isinstance(filling, GLUED) else "rest"
         self.cpu_s, self.steps, self._pace = 0.0, 0, math.inf
         self._homes: dict[SceneKey, tuple[_Home, int]] = {}
         self._present: tuple[_Home, Batch] | None = None
@@ -58,6 +71,10 @@ class SceneRuns:
     def runs(self) -> int:
         """Number of scenes that were started."""
         return len(self._records)
+
+    def forget(self) -> None:
+        """Let no further scene go on from those that were run."""
+        self._homes.clear()
 
     def cycles(self, key: SceneKey) -> int:
         """Number of cycles that a scene has gone."""
@@ -69,7 +86,8 @@ class SceneRuns:
 
     def steps_per_cycle(self, ratio: float, dt: float) -> int:
         """Steps of a cycle at a frequency ratio, none longer than dt [s]."""
-        return steps_per_cycle(ratio * self.oscillator.natural_frequency, dt)
+        frequency = ratio * self.oscillator.natural_frequency
+        return steps_per_cycle(frequency, automatic_dt(dt, frequency))
 
     def seconds(self, cycles: Mapping[SceneKey, int]) -> float:
         """CPU seconds of so many further cycles, by the fastest so far; 0 before the first."""
@@ -77,7 +95,10 @@ class SceneRuns:
         return self._pace * steps if self.steps else 0.0
 
     def go_on(self, cycles: Mapping[SceneKey, int]) -> None:
-        """Let scenes go on by numbers of cycles; those not known begin at rest."""
+        """Let scenes go on by numbers of cycles.
+
+        One that is not known goes on from where it is at twice the step, or begins.
+        """
         left = {key: count for key, count in cycles.items() if count}
         self._begin([key for key in left if key not in self._homes])
         homes: dict[_Home, dict[SceneKey, int]] = {}
@@ -88,18 +109,28 @@ class SceneRuns:
             self._go(self._batch(home), rows, left)
 
     def _begin(self, keys):
-        for first in range(0, len(keys), SCENES):
-            some = keys[first : first + SCENES]
-            ratios, seeds, steps = (np.array(column) for column in zip(*some))
-            o = self.oscillator
-            structure = (o.base_amplitude, o.mass, o.stiffness, o.damping)
-            frequency = ratios * o.natural_frequency
-            home = _Home(SceneTable(self.particles, seeds, steps, frequency, *structure))
-            self._homes.update({key: (home, s) for s, key in enumerate(some)})
-            self._records.update({key: np.empty((0, len(COLUMNS))) for key in some})
+        """Put scenes into batches; those that go on from the scenes of one batch share one."""
+        sources: dict[_Home | None, list[SceneKey]] = {}
+        for key in keys:
+            sources.setdefault(self._homes.get(key.coarser, (None, 0))[0], []).append(key)
+        for source, some in sources.items():
+            for first in range(0, len(some), SCENES):
+                self._begin_batch(source, some[first : first + SCENES])
+
+    def _begin_batch(self, source, keys):
+        ratios, seeds, longest = (np.array(column) for column in zip(*keys))
+        o = self.oscillator
+        structure = (o.base_amplitude, o.mass, o.stiffness, o.damping)
+        frequency = ratios * o.natural_frequency
+        steps = [automatic_dt(*pair) for pair in zip(longest.tolist(), frequency.tolist())]
+        table = SceneTable(self.particles, seeds, steps, frequency, *structure)
+        rows = [self._homes[key.coarser][1] for key in keys] if source else []
+        home = _Home(table, source, rows)
+        self._homes.update({key: (home, s) for s, key in enumerate(keys)})
+        self._records.update({key: np.empty((0, len(COLUMNS))) for key in keys})
 
     def _batch(self, home):
-        """The batch of some scenes, which begin at rest; the state of all others is kept aside."""
+        """The batch of some scenes; the state of all others is kept aside."""
         if self._present is not None and self._present[0] is home:
             return self._present[1]
         if self._present is not None:
@@ -107,12 +138,14 @@ class SceneRuns:
             other, batch = self._present
             other.aside, self._present = batch.aside(), None
         batch = Batch(self.filling, home.table, measured_cycles=CYCLES, if_diverged="raise")
-        if home.aside is None:
-            batch.start("rest")
+        if home.aside is not None:
+            batch.take_up(home.aside)
+        elif home.source is not None:
+            batch.take_up(home.source.aside, home.rows)
+        else:
+            batch.start(self.start)
             # Compiles, where no batch of this structure has done so.
             batch.advance(0)
-        else:
-            batch.take_up(home.aside)
         self._present = home, batch
         return batch
 
@@ -147,7 +180,10 @@ class SceneRuns:
 
 
 class SteadyRuns:
-    """Steady parts of scenes, by SceneKey; further: gives more series that must be steady."""
+    """Steady parts of scenes, by SceneKey; further: gives more series that must be steady.
+
+    share: of the budget, which may be used.
+    """
 
     def __init__(
         self,
@@ -157,10 +193,7 @@ class SteadyRuns:
     ):
         self.runs, self.budget_s, self.further = runs, budget_s, further
         self.parts: dict[SceneKey, SteadyPart] = {}
-
-    def is_full(self, keys: Iterable[SceneKey]) -> bool:
-        """Whether no scene may go on any further."""
-        return min(map(self.runs.cycles, keys)) >= _MOST_CYCLES
+        self.share = 1.0
 
     def go_on(self, keys: Iterable[SceneKey], drift: float, least: int, window: int) -> None:
         """Let scenes go on until all seeds are steady for a window of cycles.
@@ -192,8 +225,8 @@ class SteadyRuns:
                 self.runs.go_on(first)
                 more = {key: count - first.get(key, 0) for key, count in more.items()}
             needed = self.runs.cpu_s + self.runs.seconds(more)
-            if needed > self.budget_s:
-                raise BudgetSpent(needed)
+            if needed > self.share * self.budget_s:
+                raise BudgetSpent(needed / self.share)
         self.runs.go_on(more)
 
     def _missing(self, group, drift, least, window):

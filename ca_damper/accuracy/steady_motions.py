@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from ca_damper.accuracy.readings import SteadyReadings
-from ca_damper.accuracy.runs import SceneKey, SceneRuns, SteadyRuns
+from ca_damper.accuracy.runs import GLUED, SceneKey, SceneRuns, SteadyRuns
 from ca_damper.errors import SimulationDiverged
-from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.report.peak_search import PeakSearch, RatioGrid
 from ca_damper.runs.response import Response
+from ca_damper.scenes.clock import automatic_dt
 from ca_damper.spheres.options import Spheres
 from taichi_dem.kit.bars.answer import largest
 from taichi_dem.kit.bars.chance import LEAST_SEEDS
@@ -19,15 +19,18 @@ from taichi_dem.kit.bars.runs import BaseRuns, Question
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 
-# Coarsest step by the filling's own and by its bound, which is that of safe runs; that of a filling
-# without grains is as long as its oscillator lets it be.
-_OF_DEFAULT, _OF_BOUND, _WITHOUT_GRAINS = 3.0, 1.4, 8.0
+# Coarsest step by the filling's own and by its bound, which is that of safe runs. Coarse runs tell
+# of the error of finer ones at little cost.
+_OF_DEFAULT, _OF_BOUND = 4.0, 1.4
+# Share of the budget that the first level may take.
+_FIRST = 0.4
 # Seeds to begin with: so many particles in all, as few of them often have several steady motions.
 # Fewer than LEAST_SEEDS may agree by luck where there are two motions: three do in one of four.
 _FIRST_SEEDS, _PARTICLES = 8, 80
-# Cycles of the steady part of a scene, at least and at most, and of all of it at least, in the end
-# and in the pilot.
-_LEAST_WINDOW, _MOST_WINDOW, _LEAST_CYCLES, _PILOT_CYCLES = 32, 512, 64, 40
+# Cycles of the steady part of a scene, at least and at most.
+_LEAST_WINDOW, _MOST_WINDOW = 12, 512
+# Cycles of all of it at least, of one that begins at rest, and in a steady state or near it.
+_FROM_REST, _FROM_STEADY = 32, 16
 # Drift that does not matter: as a share of the value in the pilot, of the tolerance in the end.
 _PILOT_DRIFT, _DRIFT = 0.05, 0.2
 # Range of a search by the peak of the rigid mass and by the natural frequency.
@@ -65,6 +68,7 @@ class SteadyMotions(BaseRuns):
         self.averaged = self.divides = self._is_drawn()
         self.few = self.seeds = self._first_seeds()
         self.window, self.margin = _LEAST_WINDOW, 0
+        self.longest = self._longest_step()
         # Level of the step of the pilot, ratio of the peak, and the frequencies around it.
         self.coarse, self.peak, self.lattice, self.fineness = 0.0, math.nan, RatioGrid(1.0, 1.0), 0
         self.steady = SteadyRuns(runs, question.budget_s, self._goal_series)
@@ -77,7 +81,7 @@ class SteadyMotions(BaseRuns):
         if isinstance(filling, Spheres):
             # Only the places of spheres, and who has which size, are drawn.
             return particles > 0 and (filling.start is None or bool(filling.sizes))
-        return particles > 0 and not isinstance(filling, (Empty, RigidMass))
+        return particles > 0 and not isinstance(filling, GLUED)
 
     def _first_seeds(self):
         """Number of seeds to begin with; one of a filling that draws nothing."""
@@ -88,10 +92,21 @@ class SteadyMotions(BaseRuns):
 
     def step(self, level: float) -> float:
         """Largest step at a level [s]."""
-        longer = _OF_DEFAULT if self.averaged else _WITHOUT_GRAINS
-        bound = self.filling.step_bound
-        longest = math.inf if bound is None else _OF_BOUND * bound[0]
-        return min(longer * self.filling.default_dt, longest) / 2.0**level
+        return self.longest / 2.0**level
+
+    def _longest_step(self):
+        """Largest step at level 0 [s]; without grains only the cycle limits it."""
+        asked = [ratio for goal in self.question.goals for ratio in goal.ratios]
+        highest, filling = max([_ABOVE, *(self.span or ()), *asked]), self.filling
+        longest = math.inf if isinstance(filling, GLUED) else _OF_DEFAULT * filling.default_dt
+        if filling.step_bound is not None:
+            longest = min(longest, _OF_BOUND * filling.step_bound[0])
+        return automatic_dt(longest, highest * self.runs.oscillator.natural_frequency)
+
+    def _least(self, level):
+        """Cycles of a scene at least: at a finer level it goes on from the coarser one."""
+        near = level >= self.coarse + 1 or isinstance(self.filling, GLUED)
+        return _FROM_STEADY if near else _FROM_REST
 
     def nearby(self, level: float) -> float:
         """Level at which a smooth run is made again, with a tenth more steps."""
@@ -117,11 +132,14 @@ class SteadyMotions(BaseRuns):
         """Values of so many seeds at a level, (seeds, places); none where one diverged."""
         key = goal, level, count
         if key not in self._known:
+            # Two levels are needed: the first leaves room for the second.
+            self.steady.share = 1.0 if self.cost else _FIRST
             try:
                 self._find_peak(level)
                 self._go_on(level, self.names(count))
             except SimulationDiverged as diverged:
-                self.failure = str(diverged)
+                self.failure, self.coarse = str(diverged), level + 1
+                self.runs.forget()
                 return np.empty((0, 1))
             self._known[key] = goal.values(self.result(goal, level, count))
         return self._known[key]
@@ -141,34 +159,28 @@ class SteadyMotions(BaseRuns):
             return
         o, mass = self.runs.oscillator, self.runs.particles * self.filling.particle_mass
         ends = self.span or (_BELOW * o.peak(mass)[0], _ABOVE)
-        self.coarse = level
         search = PeakSearch(self._pilot_rms, *ends, self.span is None)
         self.peak, self.lattice, self.fineness = search.run()
 
     def _pilot_rms(self, ratios):
         """RMS [m] at some ratios, as well as the pilot wants to know it."""
         keys = [SceneKey(ratio, self.names(1)[0], self.step(self.coarse)) for ratio in ratios]
-        self.steady.go_on(keys, _PILOT_DRIFT, _PILOT_CYCLES, _PILOT_CYCLES // 4)
+        least = self._least(self.coarse)
+        self.steady.go_on(keys, _PILOT_DRIFT, least, least // 4)
         return [self.steady.parts[key].mean for key in keys]
 
     def _go_on(self, level, seeds):
         """Let the scenes of a level go on until they are steady."""
-        goals, levels = self.question.goals, [level]
-        if not self._known:
-            # Two levels are needed: so a budget ends both.
-            levels.append(level + 1 if self.averaged else self.nearby(level))
-        steps = [self.step(one) for one in levels]
+        goals, dt = self.question.goals, self.step(level)
         places = dict.fromkeys(ratio for goal in goals for ratio in self._ratios_of(goal))
-        keys = [SceneKey(ratio, seed, dt) for dt in steps for ratio in places for seed in seeds]
+        keys = [SceneKey(ratio, seed, dt) for ratio in places for seed in seeds]
         around = [ratio for goal in goals if not goal.ratios for ratio in self._around(goal)]
         at = self.step(self.coarse)
         few = [SceneKey(ratio, seed, at) for ratio in around for seed in seeds[:_GRID_SEEDS]]
         drift = _DRIFT * self.question.tolerance
-        self.steady.go_on(dict.fromkeys([*keys, *few]), drift, _LEAST_CYCLES, self.window)
+        self.steady.go_on(dict.fromkeys([*keys, *few]), drift, self._least(level), self.window)
         self.seconds, self.count = self.runs.cpu_s, self.runs.runs
-        for one, dt in zip(levels, steps):
-            gone = {key: self.runs.cycles(key) for key in keys if key.dt == dt}
-            self.cost[one] = self.runs.seconds(gone) / len(seeds)
+        self.cost[level] = self.runs.seconds({k: self.runs.cycles(k) for k in keys}) / len(seeds)
 
     def _goal_series(self, key):
         """Goals by cycle of this scene's frequency: they may drift where RMS rests."""
@@ -194,14 +206,14 @@ class SteadyMotions(BaseRuns):
         return sorted({*self._ratios_of(goal), *(one for some in self._wide() for one in some)})
 
     def sampling(self, goal: Goal, level: float, count: int) -> np.ndarray:
-        """Half-width by what is left of the start, by frequencies and by rounding, (places,)."""
+        """Half-width by what is left of the start, and by frequencies, (places,)."""
         size = np.abs(self.sample(goal, level, count).mean(axis=0))
         ratios, seeds = self._ratios_of(goal), self.names(count)
         found = self.readings.drift(ratios, seeds, self.step(level)) * size
         if not goal.ratios:
             few = seeds[:_GRID_SEEDS], self.step(self.coarse)
             found = np.hypot(found, self.readings.grid_error(goal, ratios, self._wide(), *few))
-        return np.hypot(found, np.minimum(self.rounding(goal), size))
+        return found
 
     def more(self, count: int) -> int | None:
         """Twice as many seeds, which go on for longer: those of a slow change differ by its phase.

@@ -13,7 +13,7 @@ import numpy as np
 from taichi_dem.kit.bars.chance import LEAST_SEEDS, f_outside, t_outside, t_quantile
 
 #: Fewer cycles are never called steady.
-LEAST_CYCLES = 32
+LEAST_CYCLES = 16
 #: Fewer cycles have no halves that could be compared.
 LEAST_TESTED = 8
 #: Cycles after which seeds that differ by more than their cycles tell are taken as they are: they
@@ -229,8 +229,9 @@ def _variance(rho, count):
 def _approach(x, allowed):
     """The longest of our windows that an exponential approach has left no further than allowed."""
     count, size = len(x), abs(float(x[len(x) // 2 :].mean()))
-    limit, error, time = _limit(x[count // 2 :])
-    windows = [max(LEAST_CYCLES, count // share) for share in _WINDOWS]
+    # Three thirds of four cycles each at least.
+    limit, error, time = _limit(x[min(count // 2, count - 12) :])
+    windows = [min(count, max(LEAST_CYCLES, count // share)) for share in _WINDOWS]
     drifts = [float(abs(x[count - tail :].mean() - limit) + 2.0 * error) for tail in windows]
     for window, drift in zip(windows, drifts):
         if drift <= allowed * size:

@@ -28,6 +28,8 @@ Affords = Callable[[float, float], bool]
 _EPSILON = np.finfo(np.float64).eps
 #: How far a twin's bodies are displaced at the start, as a share of the size of the solid.
 _ROUNDING = 1e-12
+#: Values that are rounding, as a share of the size of their unit.
+_ZERO = 64.0 * _EPSILON
 #: Share of the whole that the first run is taken for.
 _GROWTH = 0.3
 #: Frames of a run, at which twins are compared.
@@ -108,6 +110,17 @@ class Runs(BaseRuns):
     def is_whole(self, goal: Goal, level: float) -> bool:
         """Whether faces that broke are counted: a finer run may break one more."""
         return goal.kind == "count" and self.results[level].report.broken_faces > 0
+
+    def rounding(self, goal: Goal) -> float:
+        """Value of a goal that is zero but for rounding, by the size that its unit has here."""
+        result = next(iter(self.results.values()))
+        sizes = {
+            "1": lambda: 1.0,
+            "mm": lambda: 1e3 * np.ptp(self.levels.scene.mesh.points, axis=0).max(),
+            "m/s": lambda: result.peak_speed.max(),
+            "J": lambda: np.abs(list(result.report.energy_balance.values())).max(),
+        }
+        return _ZERO * float(sizes.get(goal.unit, lambda: 0.0)())
 
     def is_calm(self, coarse: float, fine: float, tolerance: float) -> bool:
         """Whether half the step moves a usual body by little, and breaks the same faces."""

@@ -19,6 +19,7 @@ from taichi_dem import (
 )
 from taichi_dem.accuracy.levels import Levels
 from taichi_dem.accuracy.runs import Runs
+from taichi_dem.goals import Goal
 from taichi_dem.mesh.shapes import placed_together, single
 from tests.scenes import BROKEN_UNTIL, UNTIL, broken_bar, struck_bar
 from tests.structures import filled
@@ -79,6 +80,23 @@ def test_a_run_has_the_same_report_whatever_was_asked_before(monkeypatch):
     answer = solve(broken_bar(), until=BROKEN_UNTIL, goal=ENERGY, progress=None)
     assert answer.plan.parting_s == 1e-5 and "1e-05 s" in str(answer)
     assert known() == before
+
+
+@pytest.mark.parametrize("unit", ["1", "mm", "m/s", "J", "N"])
+def test_a_quantity_that_is_zero_has_the_bar_of_its_noise(unit):
+    """A sum of speeds less the same in another order, as a share of what the unit has here.
+
+    It is not reached in a unit of which nothing is known.
+    """
+
+    def nothing(result):
+        speed = result.frames[-1].velocity[:, 0]
+        sizes = {"mm": 100.0, "m/s": result.peak_speed.max(), "J": ENERGY.value(result)}
+        return sizes.get(unit, 1.0) * float(speed.sum() - speed[::-1].cumsum()[-1]) / speed.sum()
+
+    answer = solve(struck_bar(), until=UNTIL, goal=Goal("nothing", unit, nothing), progress=None)
+    assert answer.reached == (unit != "N")
+    assert not answer.reached or 0.0 < abs(answer.value) <= answer.error < 1e-12
 
 
 def test_bodies_that_fly_freely_have_an_answer_to_rounding():

@@ -42,7 +42,9 @@ class DrawnRuns:
 
     def go_on(self, cycles):
         for key, count in cycles.items():
-            draw = self.draws.setdefault(key, self.make(self.rng))
+            # As a scene at half the step goes on from where it is.
+            coarser = self.draws.get(key.coarser)
+            draw = self.draws.setdefault(key, coarser or self.make(self.rng))
             before = self.records.get(key, np.empty(0))
             more = np.array([draw() for _ in range(count)])
             self.records[key] = np.concatenate([before, more])

@@ -93,12 +93,21 @@ def test_the_same_question_has_the_same_bits_whatever_budget_is_left():
     assert np.array_equal(first.result.rms, second.result.rms)
 
 
-def test_a_budget_that_runs_out_gives_the_best_answer_and_says_what_is_missing():
-    most = grains(0.0005, budget_s=1.5)
+class Paced(SceneRuns):
+    """Runs whose step takes a microsecond on any machine."""
+
+    def _go(self, *given):
+        super()._go(*given)
+        self.cpu_s, self._pace = 1e-6 * self.steps, 1e-6
+
+
+def test_a_budget_that_runs_out_gives_the_best_answer_and_says_what_is_missing(monkeypatch):
+    monkeypatch.setattr(MODULE, "SceneRuns", Paced)
+    most = grains(0.0005, budget_s=0.5, particles=30)
     assert not most.reached and most.error > 0.0005 * most.value
     assert "the budget is spent" in str(most)
-    assert most.value == pytest.approx(grains().value, rel=0.05)
-    assert most.plan.seconds <= 1.5 * 1.3
+    assert most.value == pytest.approx(grains(particles=30).value, rel=0.05)
+    assert most.plan.seconds <= 0.5
 
 
 class TwoMotions(SceneRuns):
@@ -142,6 +151,33 @@ def test_scenes_go_on_from_where_they_are_each_as_far_as_asked():
         square, mean = (whole.record[s, :, k] / whole.steps[s] for k in (1, 0))
         assert np.array_equal(found["rms"], np.sqrt(np.maximum(square - mean**2, 0.0)))
     assert runs.steps == int(70 * whole.steps.sum()) and runs.runs == 2
+
+
+def test_a_scene_goes_on_at_half_the_step_from_where_it_is():
+    """An empty box swings up: the next cycle is the same but for the samples of one step.
+
+    From rest, or from the other scene's state, it is off by half and more.
+    """
+    runs = SceneRuns(Automaton(), 0, PAPER, None)
+    coarse = [SceneKey(0.8, 1, 4e-4), SceneKey(1.0, 2, 4e-4)]
+    runs.go_on(dict.fromkeys(coarse, 10))
+    fine = [key._replace(dt=2e-4) for key in reversed(coarse)]
+    runs.go_on(dict.fromkeys(fine, 1))
+    runs.go_on(dict.fromkeys(coarse, 1))
+    for key in fine:
+        tenth, wanted = runs.by_cycle(key.coarser)["rms"][-2:]
+        (found,) = runs.by_cycle(key)["rms"]
+        assert found == pytest.approx(wanted, rel=1.0 / runs.steps_per_cycle(key.ratio, 4e-4))
+        assert runs.cycles(key) == 1 and tenth != wanted
+
+
+def test_a_fixed_mass_begins_in_its_steady_state():
+    """Of a damping ratio of 0.0006; 30 grains of 0.2 g. A turn of 1/99 of a cycle a step."""
+    oscillator = light(0.0006)
+    runs = SceneRuns(RigidMass(), 30, oscillator, None)
+    runs.go_on({SceneKey(0.9, 1, 2e-3): 1})
+    wanted = oscillator.rms(0.9 * oscillator.natural_frequency, 30 * 0.2e-3)
+    assert runs.by_cycle(SceneKey(0.9, 1, 2e-3))["rms"][0] == pytest.approx(wanted, rel=1e-6)
 
 
 @pytest.mark.parametrize("damping", [0.0006, 0.0123, 0.05])

@@ -132,6 +132,9 @@ class Evidence:
         allowed, value = self.allowed(goal), self.value(goal, last)
         if self.is_pair:
             step = np.maximum(step, SUPPORTED * (self.question.tolerance * largest(value)))
+        # A value that is zero is off by what its rounding shows.
+        size = np.abs(value)
+        step = np.maximum(step, np.where(size <= runs.rounding(goal), size, 0.0))
         if not runs.averaged:
             power = 1.0 / (one.order if one.regular else 1.0 if self.eventful else runs.order)
         parts = ErrorParts(step=step, chance=chance, sampling=runs.sampling(goal, last, self.seeds))
