@@ -65,23 +65,23 @@ class Goal(BaseGoal):
             Response of one particle number.
         """
         instance("response", response, Response)
-        found = np.asarray(self.function(response), dtype=np.float64)
-        if found.ndim not in (1, 2) or len(found) != len(response.seeds) or found.size == 0:
+        values = np.asarray(self.function(response), dtype=np.float64)
+        if values.ndim not in (1, 2) or len(values) != len(response.seeds) or values.size == 0:
             raise InputError(
                 f"function of the goal {self.name!r} must return one value or one row for each of "
-                f"{counted(len(response.seeds), 'seed')}, got shape {found.shape}"
+                f"{counted(len(response.seeds), 'seed')}, got shape {values.shape}"
             )
-        return found.reshape(len(found), -1)
+        return values.reshape(len(values), -1)
 
 
 def peak_ratio() -> Goal:
     """Frequency ratio f/f0 [-] at which the RMS displacement peaks."""
-    return Goal("peak ratio", "1", lambda found: found.peaks()[0][0], "extreme")
+    return Goal("peak ratio", "1", lambda response: response.peaks()[0][0], "extreme")
 
 
 def peak_rms() -> Goal:
     """Height of the peak of the RMS displacement [m]."""
-    return Goal("peak RMS", "m", lambda found: found.peaks()[1][0], "extreme")
+    return Goal("peak RMS", "m", lambda response: response.peaks()[1][0], "extreme")
 
 
 def rms_at(ratio: float) -> Goal:
@@ -126,7 +126,7 @@ def response_curve(ratios: Sequence[float] | np.ndarray) -> Goal:
         Ascending frequency ratios f/f0.
     """
     given = several("ratios", ratios, positive)
-    return Goal("response curve", "m", lambda found: found.rms[0].T, "curve", given)
+    return Goal("response curve", "m", lambda response: response.rms[0].T, "curve", given)
 
 
 def _measure_at(name, unit, measure, ratio):

@@ -88,7 +88,7 @@ def solve_response(
     """
     check_filling(filling)
     question = checked_question(
-        several("goal", goal, lambda name, one: instance(name, one, Goal)),
+        several("goal", goal, lambda name, single: instance(name, single, Goal)),
         MEASURED,
         tolerance=tolerance,
         confidence=confidence,
@@ -97,11 +97,11 @@ def solve_response(
     )
     other = _other(filling, question)
     o = Oscillator() if oscillator is None else instance("oscillator", oscillator, Oscillator)
-    one = Grid(filling, particles, 1.0, 1 if seeds is None else seeds, o, None)
-    if len(one.particles) != 1:
+    single = Grid(filling, particles, 1.0, 1 if seeds is None else seeds, o, None)
+    if len(single.particles) != 1:
         raise InputError(f"particles must be one whole number, got {shown(particles)}")
-    fixed = None if seeds is None else one.seeds
-    solved = partial(_solved, one.particles[0], o, _range(ratios), fixed, progress)
+    fixed = None if seeds is None else single.seeds
+    solved = partial(_solved, single.particles[0], o, _range(ratios), fixed, progress)
     answers = solved(filling, question)
     others = _others(question, other, answers, solved)
     answers = tuple(_with_filling(*pair, filling) for pair in zip(answers, others))
@@ -149,8 +149,8 @@ def _others(question, other, answers, solved):
 def _with_filling(answer, other, filling):
     """The answer with its filling as a source of error, where there is another."""
     source = filling_source(answer, filling, other)
-    made = answer if source is None else with_source(answer, source)
-    return doubted(made, other) if isinstance(other, str) else made
+    answered = answer if source is None else with_source(answer, source)
+    return doubted(answered, other) if isinstance(other, str) else answered
 
 
 def _range(ratios):

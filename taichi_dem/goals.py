@@ -82,9 +82,9 @@ class Goal(BaseGoal):
         result : Result
             Result with a frame at its end.
         """
-        found: Any = self.function(instance("result", result, Result))
-        single = isinstance(found, (np.ndarray, np.generic)) and found.size == 1
-        value: Any = found.item() if single else found
+        number: Any = self.function(instance("result", result, Result))
+        single = isinstance(number, (np.ndarray, np.generic)) and number.size == 1
+        value: Any = number.item() if single else number
         if not finite(value):
             raise InputError(
                 f"function of the goal {self.name!r} must return a finite number, "

@@ -29,7 +29,7 @@ class SteadyReadings:
         # spacing, or without one near the peak. A tenth if the peak is lost at twice the spacing.
         everywhere = sorted({*ratios, *(ratio for some in wide for ratio in some)})
         inside = [ratio for ratio in ratios if ratio not in (everywhere[0], everywhere[-1])]
-        without = [[one for one in everywhere if one != ratio] for ratio in inside]
+        without = [[left_out for left_out in everywhere if left_out != ratio] for ratio in inside]
         own, *others = (
             goal.values(self.response(some, seeds, dt)).mean(axis=0)
             for some in (ratios, *wide, *without)
@@ -47,7 +47,7 @@ class SteadyReadings:
             goal.values(self.response(some, seeds, dt))
             for some in (ratios, ratios[1:], ratios[:-1])
         )
-        changed = np.any([np.abs(one - whole) > 0.0 for one in without], axis=0)
+        changed = np.any([np.abs(value - whole) > 0.0 for value in without], axis=0)
         return bool((changed.mean(axis=0) > 0.5).any())
 
     def series(self, goal: Goal, key: SceneKey) -> np.ndarray:
@@ -63,7 +63,9 @@ class SteadyReadings:
             keys = [SceneKey(ratio, seed, dt) for seed in seeds]
             rows.append([self.runs.measures(key, self.steady.parts[key].begin) for key in keys])
         values = {
-            name: np.stack([np.concatenate([one[name] for one in row]) for row in rows])[None]
+            name: np.stack([np.concatenate([measures[name] for measures in row]) for row in rows])[
+                None
+            ]
             for name in MEASURE_UNITS
         }
         return self._made(ratios, tuple(seeds), dt, values)

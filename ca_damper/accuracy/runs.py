@@ -244,8 +244,10 @@ class SteadyRuns:
     def _check(self, group, drift):
         shortest = min(map(self.runs.cycles, group))
         by_cycle = [(key, self.runs.by_cycle(key)) for key in group]
-        series = [(one["rms"], one["amplitude"], *self.further(key)) for key, one in by_cycle]
-        rows = [np.stack([one[:shortest] for one in seeds]) for seeds in zip(*series)]
+        series = [
+            (values["rms"], values["amplitude"], *self.further(key)) for key, values in by_cycle
+        ]
+        rows = [np.stack([values[:shortest] for values in seeds]) for seeds in zip(*series)]
         part = _steady(rows, drift)
         self.parts.update(dict.fromkeys(group, part))
         return part

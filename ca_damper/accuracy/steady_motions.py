@@ -203,17 +203,17 @@ class SteadyMotions(BaseRuns):
 
     def _around(self, goal):
         """All ratios by which the frequencies at a peak are judged."""
-        return sorted({*self._ratios_of(goal), *(one for some in self._wide() for one in some)})
+        return sorted({*self._ratios_of(goal), *(ratio for some in self._wide() for ratio in some)})
 
     def sampling(self, goal: Goal, level: float, count: int) -> np.ndarray:
         """Half-width by what is left of the start, and by frequencies, (places,)."""
         size = np.abs(self.sample(goal, level, count).mean(axis=0))
         ratios, seeds = self._ratios_of(goal), self.names(count)
-        found = self.readings.drift(ratios, seeds, self.step(level)) * size
+        error = self.readings.drift(ratios, seeds, self.step(level)) * size
         if not goal.ratios:
             few = seeds[:_GRID_SEEDS], self.step(self.coarse)
-            found = np.hypot(found, self.readings.grid_error(goal, ratios, self._wide(), *few))
-        return found
+            error = np.hypot(error, self.readings.grid_error(goal, ratios, self._wide(), *few))
+        return error
 
     def more(self, count: int) -> int | None:
         """Twice as many seeds, which go on for longer: those of a slow change differ by its phase.
@@ -256,14 +256,14 @@ class SteadyMotions(BaseRuns):
 
     def doubts(self, goal: Goal, levels: Any, bar: Any, affords: Any) -> list[str]:
         """Reasons to doubt a goal: it does not peak there, or one seed shows no spread."""
-        told = [_ONE_SEED] if self.averaged and self.few == 1 else []
+        doubts = [_ONE_SEED] if self.averaged and self.few == 1 else []
         few = self.names(self.few)[:_GRID_SEEDS], self.step(self.coarse)
         if not goal.ratios and self.readings.is_at_end(goal, self._around(goal), *few):
-            told.append(
+            doubts.append(
                 "the extreme lies at an end of the frequencies around the highest RMS, so that it "
                 "may go on beyond: ask for values at ratios"
             )
-        return told
+        return doubts
 
     def in_words(self, level: float, count: int) -> str:
         """Filling, step, frequencies, seeds and cycles."""

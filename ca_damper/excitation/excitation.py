@@ -47,27 +47,31 @@ class Excitation:
     def signals(self) -> dict[str, Signal]:
         """Signals that there are, by "base" and "force"."""
         both = {"base": self.base, "force": self.force}
-        return {role: one for role, one in both.items() if one is not None}
+        return {role: signal for role, signal in both.items() if signal is not None}
 
     @property
     def sizes(self) -> dict[str, int]:
         """Number of nodes of each Signal, by the name of a place in an engine."""
-        return {f"{role}_nodes": len(one.value) for role, one in self.signals.items()}
+        return {f"{role}_nodes": len(signal.value) for role, signal in self.signals.items()}
 
     @property
     def duration(self) -> float:
         """Time up to which it acts [s]; infinite for sines."""
-        return min((one.duration for one in self.signals.values()), default=math.inf)
+        return min((signal.duration for signal in self.signals.values()), default=math.inf)
 
     def identity(self) -> str:
         """Words that are the same for equal excitations, whatever their labels."""
-        signals = {role: (one.step, one.value, one.bend) for role, one in self.signals.items()}
+        signals = {
+            role: (signal.step, signal.value, signal.bend) for role, signal in self.signals.items()
+        }
         return identity_of({"base": self.base, "force": self.force, **signals})
 
     def in_words(self) -> tuple[str, ...]:
         """Motion of the base and force, and the treatment of samples."""
         units = {"base": "m", "force": "N"}
-        return tuple(f"{role} {one.in_words(units[role])}" for role, one in self.signals.items())
+        return tuple(
+            f"{role} {signal.in_words(units[role])}" for role, signal in self.signals.items()
+        )
 
 
 def excitation_of(value: Any) -> Excitation:

@@ -59,7 +59,7 @@ def sines(
     try:
         rows = np.broadcast_arrays(*map(np.array, lists))
     except ValueError:
-        counts = [len(one) for one in lists]
+        counts = [len(numbers) for numbers in lists]
         raise InputError(
             f"frequencies, amplitudes and phases must be one or as many as each other, got {counts}"
         ) from None

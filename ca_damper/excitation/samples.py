@@ -94,8 +94,8 @@ def from_samples(
         samples, words = _without_drift(step, samples, highpass)
         done.append(words)
     _check_spectrum(step, samples)
-    made, words = _integrated(step, samples, of, correct_baseline)
-    return replace(made, treated="; ".join(filter(None, (*done, words))), apart=step, gap=gap)
+    motion, words = _integrated(step, samples, of, correct_baseline)
+    return replace(motion, treated="; ".join(filter(None, (*done, words))), apart=step, gap=gap)
 
 
 def _resampled(times, samples, step):
@@ -143,8 +143,8 @@ def _integrated(step, samples, of, correct_baseline):
     if of == "velocity":
         # Of the cubic through both values and second derivatives of an interval.
         areas = 0.5 * (value[:-1] + value[1:]) - fine**2 / 24.0 * (bend[:-1] + bend[1:])
-        way = fine * np.concatenate([[0.0], np.cumsum(areas)])
-        return spline(fine, way, "samples"), "integrated from zero"
+        travel = fine * np.concatenate([[0.0], np.cumsum(areas)])
+        return spline(fine, travel, "samples"), "integrated from zero"
     pull = value - fine**2 / 12.0 * bend
     if correct_baseline:
         return _at_rest_again(fine, pull)

@@ -156,10 +156,10 @@ def end_slope(signal: Signal) -> float:
 
 def nodes(name: str, values: ArrayLike) -> np.ndarray:
     """A copy of finite numbers (nodes,) that refuses to be written."""
-    found = real_numbers(name, values)
-    if found.ndim != 1 or not LEAST_NODES <= len(found) <= MOST_NODES:
+    numbers = real_numbers(name, values)
+    if numbers.ndim != 1 or not LEAST_NODES <= len(numbers) <= MOST_NODES:
         raise InputError(
             f"{name} must be from {LEAST_NODES} to {MOST_NODES} numbers, got {shown(values)}"
         )
-    found.flags.writeable = False
-    return found
+    numbers.flags.writeable = False
+    return numbers

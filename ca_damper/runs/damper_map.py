@@ -121,12 +121,14 @@ class DamperMap(ScenesResult):
         return collect_and_collide(np.array(self.amplitudes), self.gaps[:, :, None])
 
     def _axes(self) -> dict[str, Any]:
-        axes = {one: (getattr(self, name), unit) for one, (name, unit) in _AXES.items()}
-        return {one: axis for one, axis in axes.items() if axis[0] != (None,)}
+        axes = {name_of: (getattr(self, name), unit) for name_of, (name, unit) in _AXES.items()}
+        return {name_of: axis for name_of, axis in axes.items() if axis[0] != (None,)}
 
     def _variables(self) -> dict[str, Any]:
-        found = {name: (tuple(_AXES), getattr(self, name), unit) for name, unit in _UNITS.items()}
-        return {**found, "gap": (("clearance", "particles"), self.gaps, "m")}
+        variables = {
+            name: (tuple(_AXES), getattr(self, name), unit) for name, unit in _UNITS.items()
+        }
+        return {**variables, "gap": (("clearance", "particles"), self.gaps, "m")}
 
     def columns(self) -> dict[str, Any]:
         """A row a scene: its place on the axes, measures, and where there is one the theory."""
@@ -137,8 +139,8 @@ class DamperMap(ScenesResult):
         columns |= {name: getattr(self, name).ravel() for name in ("loss", "mass_share", "energy")}
         if np.isnan(self.gaps).any():  # a filling without a box: no theory
             return columns
-        made = {"loss_theory": self.theory.loss, "mass_theory": self.theory.mass}
-        return columns | {name: self._of_scenes(values) for name, values in made.items()}
+        theory_columns = {"loss_theory": self.theory.loss, "mass_theory": self.theory.mass}
+        return columns | {name: self._of_scenes(values) for name, values in theory_columns.items()}
 
     def _of_scenes(self, values: np.ndarray) -> np.ndarray:
         """Values over the first axes as a number a scene, (scenes,)."""
@@ -211,12 +213,12 @@ def damper_map(
     with reporting(progress, "map") as report_progress:
         tell = Stages(report_progress, [(k + 1.0) / len(jobs) for k in range(len(jobs))])
         runs = [
-            _run(one, {**axes, "particles": numbers}, step, cycles, tell) for one, numbers in jobs
+            _run(box, {**axes, "particles": numbers}, step, cycles, tell) for box, numbers in jobs
         ]
-    gaps = [clearance_of(one, number) for one, numbers in jobs for number in numbers]
+    gaps = [clearance_of(box, number) for box, numbers in jobs for number in numbers]
     shape = len(ways), *map(len, axes.values())
     measures: dict[str, Any] = {
-        name: np.concatenate([getattr(found, name) for found, _ in runs]).reshape(shape)
+        name: np.concatenate([getattr(run, name) for run, _ in runs]).reshape(shape)
         for name in ("apparent_damping", "apparent_mass")
     }
     own: dict[str, Any] = {
@@ -224,7 +226,10 @@ def damper_map(
         "particle_mass": filling.particle_mass,
         "clearances": ways,
     }
-    own |= {"gaps": np.array(gaps).reshape(shape[:2]), "reports": tuple(told for _, told in runs)}
+    own |= {
+        "gaps": np.array(gaps).reshape(shape[:2]),
+        "reports": tuple(report for _, report in runs),
+    }
     return DamperMap(**own, **axes, **measures)
 
 
@@ -232,7 +237,7 @@ def _jobs(filling, particles, clearances):
     if clearances == (None,):
         return [(filling, particles)]
     pairs = itertools.product(clearances, particles)
-    return [(with_clearance(filling, number, way), (number,)) for way, number in pairs]
+    return [(with_clearance(filling, number, clearance), (number,)) for clearance, number in pairs]
 
 
 def _run(filling, axes, dt, cycles, progress):

@@ -82,8 +82,8 @@ class Film:
         """The history as an xarray Dataset over sample and scene, units in attributes."""
         dims = "sample", "scene"
         units = {"time_s": "s", **SAMPLE_UNITS}
-        found = {name: (dims, array, units[name]) for name, array in self.history.items()}
-        return dataset(found, {})
+        variables = {name: (dims, array, units[name]) for name, array in self.history.items()}
+        return dataset(variables, {})
 
 
 def film(

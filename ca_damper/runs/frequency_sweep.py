@@ -53,8 +53,8 @@ class Sweep:
 
     def __repr__(self):
         shows = self.shows_hysteresis
-        told = f"hysteresis beyond chance at {shows.sum()} of {shows.size} points"
-        return in_brief(self, self.up.axes_in_words(), "up and down", told)
+        words = f"hysteresis beyond chance at {shows.sum()} of {shows.size} points"
+        return in_brief(self, self.up.axes_in_words(), "up and down", words)
 
     @property
     def hysteresis(self) -> np.ndarray:
@@ -168,9 +168,9 @@ def sweep_up_and_down(
                     batch.drive(grid.ratios[k] * grid.oscillator.natural_frequency)
                 ways.record(batch, batch.run(transient_cycles, measured_cycles, tell))
             responses = ways.response(0), ways.response(1)
-            found = Sweep(*responses, batch.report(), *ways.values[_ERROR])
-            writer.save(found)
-    return found
+            sweep = Sweep(*responses, batch.report(), *ways.values[_ERROR])
+            writer.save(sweep)
+    return sweep
 
 
 class _Ways:
@@ -184,12 +184,12 @@ class _Ways:
 
     def record(self, batch, cycles):
         """Record the measures at the next frequency; half-widths hold at all of them together."""
-        way, k = self.order[self.done]
+        direction, k = self.order[self.done]
         confidence = 1.0 - 0.05 / len(self.grid.ratios)
         errors = np.array([half_width(row, confidence) for row in cycles.rms_by_cycle])
         for name, value in {**self.grid.measures(cycles), _ERROR: errors}.items():
-            self.values[name][way, :, k] = value.reshape(-1, len(self.grid.seeds))
-        self.steps[way, k] = batch.steps_per_cycle[0]
+            self.values[name][direction, :, k] = value.reshape(-1, len(self.grid.seeds))
+        self.steps[direction, k] = batch.steps_per_cycle[0]
         self.done += 1
 
     def saved(self):
@@ -199,6 +199,6 @@ class _Ways:
         self.done, self.steps = int(saved["done"]), saved["steps"]
         self.values = {name: saved[name] for name in self.values}
 
-    def response(self, way):
-        measures = {name: self.values[name][way] for name in MEASURE_UNITS}
-        return self.grid.response(self.steps[way], measures)
+    def response(self, direction):
+        measures = {name: self.values[name][direction] for name in MEASURE_UNITS}
+        return self.grid.response(self.steps[direction], measures)

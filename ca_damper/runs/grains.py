@@ -97,7 +97,7 @@ def boxes_of(
 ) -> list[Grains]:
     """Boxes to look at: grains of one mass in whole cells of their size."""
     width, height = pair_of("box", box, "an inner width and a greatest inner height [m]", positive)
-    found, enough = [], []
+    boxes, enough = [], []
     for count in counts:
         own = mass / count
         size = diameter_of(own, density)
@@ -105,14 +105,14 @@ def boxes_of(
         least = 1 + math.ceil(count / max(1, columns))
         if columns and most >= least:
             rows = np.unique(np.linspace(least, most, heights).round().astype(int))
-            found += [Grains(count, own, size, columns * size, row * size) for row in rows]
+            boxes += [Grains(count, own, size, columns * size, row * size) for row in rows]
         enough.append((max(width, size), least * size))
-    if not found:
+    if not boxes:
         # Upwards to a tenth of a millimetre, so that it does.
-        wide, high = (math.ceil(1e4 * one - 1e-6) / 1e4 for one in min(enough))
+        wide, high = (math.ceil(1e4 * length - 1e-6) / 1e4 for length in min(enough))
         raise InputError(
             f"box must hold {mass:g} kg of grains with a layer free above them, in one sheet that "
             f"is a grain deep: at least ({wide:g}, {high:g}) m, got {shown(box)} m for "
             f"{listed(counts)} grains"
         )
-    return found
+    return boxes

@@ -56,15 +56,15 @@ class MotionHistory(ScenesResult):
         """A row a sample: time, base, x of each place and force on each container, by seed."""
         columns = {"time_s": self.time_s, "base_m": self.base}
         for values, (head, names) in zip((self.x, self.force), self._names().items()):
-            for (i, one), (j, seed) in itertools.product(enumerate(names), enumerate(self.seeds)):
-                columns[f"{head}{one}_seed{seed}"] = values[:, i, j]
+            for (i, name), (j, seed) in itertools.product(enumerate(names), enumerate(self.seeds)):
+                columns[f"{head}{name}_seed{seed}"] = values[:, i, j]
         return columns
 
     def _axes(self) -> dict[str, Any]:
         return {"time": (self.time_s, "s"), "seed": (self.seeds, "1")}
 
     def _variables(self) -> dict[str, Any]:
-        place, container = ((one, "seed") for one in self._dimensions)
+        place, container = ((axis, "seed") for axis in self._dimensions)
         return {
             "base": (("time",), self.base, "m"),
             "x": (("time", *place), self.x, "m"),

@@ -132,15 +132,15 @@ class Response(ScenesResult):
     def _peak_rows(self, rows):
         """Cells of the table of peaks: median over the seeds, and lowest to highest RMS."""
         natural = self.oscillator.natural_frequency
-        found = []
+        peak_rows = []
         for k, ratio, rms in zip(rows, *(measure[rows] for measure in self.peaks())):
             middle, spread = np.median(ratio), 1e3 * rms
             cells = f"{middle:.4f}", f"{natural * middle:.4g}", f"{np.median(spread):.4g}"
             ends = f"{spread.min():.4g} to {spread.max():.4g}"
             unknown = DIVERGED if np.isnan(self.rms[k]).any() else OUTSIDE
             row = (*cells, ends) if math.isfinite(middle) else (unknown,) * 4
-            found.append((f"{self.particles[k]}", *row))
-        return found
+            peak_rows.append((f"{self.particles[k]}", *row))
+        return peak_rows
 
     def peaks(self) -> tuple[np.ndarray, np.ndarray]:
         """Locate the peak of each curve.
@@ -152,9 +152,9 @@ class Response(ScenesResult):
             where a peak lies outside the ratios: its curve is highest at the first or last of them.
         """
         curves = np.moveaxis(self.rms, 2, 1).reshape(-1, len(self.ratios))
-        found = np.array([peak(self.ratios, curve) for curve in curves])
+        peaks = np.array([peak(self.ratios, curve) for curve in curves])
         shape = (len(self.particles), len(self.seeds))
-        return found[:, 0].reshape(shape), found[:, 1].reshape(shape)
+        return peaks[:, 0].reshape(shape), peaks[:, 1].reshape(shape)
 
     @property
     def dt(self) -> np.ndarray:
@@ -235,14 +235,16 @@ class AmplitudeResponse(Tabulated):
             Frequency ratio f/f0 [-] and RMS displacement [m] of the peaks, each of shape
             (amplitudes, particles, seeds); NaN where a peak lies outside the ratios.
         """
-        ratio, rms = zip(*(one.peaks() for one in self.responses))
+        ratio, rms = zip(*(response.peaks() for response in self.responses))
         return np.stack(ratio), np.stack(rms)
 
     def columns(self) -> dict[str, Any]:
         """A row a scene, as of ``Response.columns``, with its amplitude in front."""
-        columns = [one.columns() for one in self.responses]
-        sizes = [len(one["filling"]) for one in columns]
-        joined = {name: np.concatenate([one[name] for one in columns]) for name in columns[0]}
+        columns = [response.columns() for response in self.responses]
+        sizes = [len(response["filling"]) for response in columns]
+        joined = {
+            name: np.concatenate([response[name] for response in columns]) for name in columns[0]
+        }
         amplitude = np.repeat(self.amplitudes, sizes)
         return {"base_amplitude_m": amplitude, **joined}
 
@@ -329,17 +331,21 @@ def frequency_response(
             cycles = batch.run(transient_cycles, measured_cycles, report_progress)
             sampled = _sampling(cycles, grid.oscillator, transient_cycles)
             report = replace(batch.report(), **sampled)
-            made = tuple(replace(one, report=report) for one in grid.responses(batch, cycles))
-            found = AmplitudeResponse(grid.amplitudes, made) if grid.is_several else made[0]
-            writer.save(found)
-    return found
+            responses = tuple(
+                replace(response, report=report) for response in grid.responses(batch, cycles)
+            )
+            result = (
+                AmplitudeResponse(grid.amplitudes, responses) if grid.is_several else responses[0]
+            )
+            writer.save(result)
+    return result
 
 
 def _sampling(cycles, oscillator, transient):
     """What is known of the mean RMS in the scene where it is highest, by name for a Report."""
     highest = int(np.nanargmax(cycles.rms))
-    one = slice(highest, highest + 1)
-    scene = Cycles(cycles.frequency[one], cycles.steps[one], cycles.record[one])
+    last = slice(highest, highest + 1)
+    scene = Cycles(cycles.frequency[last], cycles.steps[last], cycles.record[last])
     series = scene.rms_by_cycle[0]
     mean = float(series.mean())
     if not mean > 0.0 or len(series) < 2:
@@ -349,9 +355,9 @@ def _sampling(cycles, oscillator, transient):
         return {"transient": f"a mean over {few}, {LEAST_TESTED} show whether it still changes"}
     change, may_be_chance = change_of_halves(series)
     if not may_be_chance:
-        way = "grows" if change > 0.0 else "falls"
+        trend = "grows" if change > 0.0 else "falls"
         share, all_of_them = f"{100.0 * abs(change):.2g} %", counted(len(series), "cycle")
-        return {"transient": f"it {way} by {share} from half to half of {all_of_them}"}
+        return {"transient": f"it {trend} by {share} from half to half of {all_of_them}"}
     own = oscillator.mass, oscillator.stiffness, oscillator.damping
     ratio = float(scene.damping_ratio(*own)[0])
     left = math.exp(-2.0 * math.pi * ratio * (transient + 0.5 * len(series)))
@@ -435,10 +441,10 @@ class Grid:
         """The Response of a batch that has run, one for each amplitude."""
         shape = (len(self.amplitudes), *self.shape)
         steps = batch.steps_per_cycle.reshape(shape)[0, 0, :, 0]
-        values = {name: one.reshape(shape) for name, one in self.measures(cycles).items()}
+        values = {name: measure.reshape(shape) for name, measure in self.measures(cycles).items()}
         for k, amplitude in enumerate(self.amplitudes):
-            made = self.response(steps, {name: one[k] for name, one in values.items()})
-            yield replace(made, oscillator=replace(self.oscillator, base_amplitude=amplitude))
+            response = self.response(steps, {name: measure[k] for name, measure in values.items()})
+            yield replace(response, oscillator=replace(self.oscillator, base_amplitude=amplitude))
 
 
 def stacked(responses: Sequence[Response], name: str, values: list, **attributes: str) -> Any:
@@ -446,7 +452,7 @@ def stacked(responses: Sequence[Response], name: str, values: list, **attributes
     import xarray
 
     axis = xarray.Variable(name, values, attributes)
-    return xarray.concat([one.to_xarray() for one in responses], axis)
+    return xarray.concat([response.to_xarray() for response in responses], axis)
 
 
 def measures_of(oscillator: Oscillator, cycles: Cycles) -> dict[str, np.ndarray]:

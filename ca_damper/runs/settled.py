@@ -31,7 +31,7 @@ class SteadyPeak:
         def rms_at(ratios: list[float]) -> list[float]:
             rms, errors = self._rms(ratios, doublings)
             self.found.update(zip(ratios, zip(rms, errors)))
-            return [float(one) for one in rms.mean(axis=1)]
+            return [float(ratio) for ratio in rms.mean(axis=1)]
 
         # Grains only add to the structure's own damping, and no peak is narrower than by that.
         finest = self.scenes["oscillator"].damping_ratio
@@ -41,7 +41,7 @@ class SteadyPeak:
             # A peak outside has no vertex: the highest value stands.
             pass
         ratios = np.array(sorted(self.found))
-        rms, errors = (np.array([self.found[one][k] for one in ratios]) for k in (0, 1))
+        rms, errors = (np.array([self.found[ratio][k] for ratio in ratios]) for k in (0, 1))
         if np.isnan(rms).any():
             return np.full(rms.shape[1], np.nan), np.nan
         highest = int(rms.mean(axis=1).argmax())
@@ -63,7 +63,7 @@ class SteadyPeak:
                 break
             cycles = batch.run(2**k * self.transient, self.measured, self.progress)
         shape = grid.shape[1:]
-        return tuple(one.reshape(shape) for one in steady_rms(cycles, weight))
+        return tuple(reading.reshape(shape) for reading in steady_rms(cycles, weight))
 
 
 def _near(structure, frequency, mass, weight):
@@ -105,8 +105,8 @@ def limit_of(harmonic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _top(ratios, curve):
-    found = peak(ratios, curve)[1]
-    return float(curve.max()) if np.isnan(found) else found
+    top = peak(ratios, curve)[1]
+    return float(curve.max()) if np.isnan(top) else top
 
 
 def _spacing(ratios, rms, highest):
@@ -114,4 +114,4 @@ def _spacing(ratios, rms, highest):
     curve = rms.mean(axis=1)
     around = range(max(0, highest - 1), min(len(ratios), highest + 2))
     without = (_top(np.delete(ratios, k), np.delete(curve, k)) for k in around)
-    return max(abs(one - _top(ratios, curve)) for one in without)
+    return max(abs(fewer - _top(ratios, curve)) for fewer in without)

@@ -121,11 +121,13 @@ def shake(
     with _recorded(
         (filling, table), options, window, start, progress, (job, checkpoint, resume)
     ) as (common, motion, writer):
-        over_axes = {name: one.reshape(*one.shape[:-1], *shape) for name, one in motion.items()}
+        over_axes = {
+            name: values.reshape(*values.shape[:-1], *shape) for name, values in motion.items()
+        }
         axes: dict[str, Any] = {"oscillator": own, "particles": counts, "seeds": numbered}
-        found = TimeHistory(**axes, **common, **over_axes)
-        writer.save(found)
-    return found
+        history = TimeHistory(**axes, **common, **over_axes)
+        writer.save(history)
+    return history
 
 
 def shake_structure(
@@ -191,8 +193,8 @@ def shake_structure(
         )
     boxed = several("boxes", boxes, lambda name, box: instance(name, box, Box))
     own = [filling if box.filling is None else box.filling for box in boxed]
-    for box, one in zip(boxed, own):
-        whole("particles", box.particles, 0, one.capacity)
+    for box, values in zip(boxed, own):
+        whole("particles", box.particles, 0, values.capacity)
     modal = ModalMount(structure, [box.place for box in boxed], force_place)
     scenes = modal.group * len(numbered)
     if scenes > MOST_SCENES:
@@ -217,13 +219,15 @@ def shake_structure(
     ) as (common, motion, writer):
         taken = {**dict.fromkeys(motion, places), "force": slice(len(boxed))}
         over_axes = {
-            name: np.swapaxes(one.reshape(*one.shape[:-1], *groups), -1, -2)[..., taken[name], :]
-            for name, one in motion.items()
+            name: np.swapaxes(values.reshape(*values.shape[:-1], *groups), -1, -2)[
+                ..., taken[name], :
+            ]
+            for name, values in motion.items()
         }
         axes: dict[str, Any] = {"structure": structure, "boxes": boxed, "seeds": numbered}
-        found = StructureHistory(**axes, **common, **over_axes)
-        writer.save(found)
-    return found
+        history = StructureHistory(**axes, **common, **over_axes)
+        writer.save(history)
+    return history
 
 
 class Window(NamedTuple):
@@ -282,7 +286,7 @@ def _longest_step(fillings, structure, dt):
     """Step asked for [s], or that of the fillings and of the highest mode; InputError."""
     highest = float(structure.frequencies.max())
     if dt is None:
-        return automatic_dt(min(one.default_dt for one in fillings), highest)
+        return automatic_dt(min(filling.default_dt for filling in fillings), highest)
     most, longest = positive("dt", dt), 1.0 / (LEAST_STEPS_PER_CYCLE * highest)
     if most > longest * (1.0 + 1e-12):
         got, bound = told_apart(most, longest)

@@ -47,8 +47,8 @@ class Levels:
     @cached_property
     def _coarsest(self):
         """Steps at level 0, the fewest that are stable, and order of the error from there on."""
-        drives = (one for one in self.scene.effects if isinstance(one, BodyEffect))
-        change = min((one.change_time() for one in drives), default=math.inf)
+        drives = (effect for effect in self.scene.effects if isinstance(effect, BodyEffect))
+        change = min((effect.change_time() for effect in drives), default=math.inf)
         longest = self._longest_step()
         step = max(min(longest, change), longest / _MOST_TIMES)
         # A pulse within a step is a kick, which lies between the steps of two levels by chance.

@@ -79,8 +79,8 @@ class Runs(BaseRuns):
 
     def sample(self, goal: Goal, level: float, count: int) -> np.ndarray:
         """Values of a run and its twins that did not diverge, (runs, 1)."""
-        found = (self.value(level, twin) for twin in range(count))
-        return np.array([value for value in found if value is not None]).reshape(-1, 1)
+        values = (self.value(level, twin) for twin in range(count))
+        return np.array([value for value in values if value is not None]).reshape(-1, 1)
 
     def step(self, level: float) -> float:
         """Step at a level [s]."""
@@ -148,10 +148,10 @@ class Runs(BaseRuns):
         account, round_off = report.energy_balance, report.round_off_J
         if unexplained_share(account, round_off) > OPEN:
             yield from open_account(account, round_off)
-        found = report.certificate
-        if found is not None and not found.holds:
-            why = f"the certificate of its run does not hold, as {found.failure}"
-            yield f"{why}, about {awake_price(self, found):.2g} s"
+        certificate = report.certificate
+        if certificate is not None and not certificate.holds:
+            why = f"the certificate of its run does not hold, as {certificate.failure}"
+            yield f"{why}, about {awake_price(self, certificate):.2g} s"
 
     def release(self) -> None:
         """Give the engine back, which another scene can use; a later run sets up another."""
@@ -161,8 +161,8 @@ class Runs(BaseRuns):
 
     def parting(self, level: float, tolerance: float) -> float:
         """Time at which one rounding has grown to a tolerance, at a level [s]; or infinite."""
-        one, two = (self.frames(level, twin) for twin in (0, 1))
-        for frame, other in zip(one[1:], two[1:]):
+        first, second = (self.frames(level, twin) for twin in (0, 1))
+        for frame, other in zip(first[1:], second[1:]):
             if _apart(other, frame) > tolerance:
                 return float(frame.time_s)
         return math.inf
@@ -241,8 +241,8 @@ class Runs(BaseRuns):
 
 def _apart(frame, finer):
     """Difference of the displacements of a usual body, as a share of a usual one."""
-    ways = finer.displacement, frame.displacement - finer.displacement
-    moved, apart = (np.linalg.norm(way, axis=1) for way in ways)
+    differences = finer.displacement, frame.displacement - finer.displacement
+    moved, apart = (np.linalg.norm(difference, axis=1) for difference in differences)
     return _share(apart, moved, _EPSILON * np.abs(finer.position).max())
 
 

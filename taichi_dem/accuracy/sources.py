@@ -90,23 +90,23 @@ class Beside:
         values, seconds = [], 0.0
         self.runs.release()
         for scene in scenes:
-            made = self.runs.of(scene)
+            runs = self.runs.of(scene)
             # A scene that cannot begin raises instead.
             with contextlib.suppress(SimulationDiverged):
-                values.append(made.value(self.level))
-            seconds += made.seconds
-            made.release()
+                values.append(runs.value(self.level))
+            seconds += runs.seconds
+            runs.release()
         return [value for value in values if value is not None], seconds
 
     def _left_out(self):
         """What is left out where effects act on demand: nothing, or nobody knows how much."""
-        found = self.report.certificate
-        if found is None:
+        certificate = self.report.certificate
+        if certificate is None:
             return Source("left out", 0.0, "each listed effect acts in every step", 0.0)
-        if found.holds:
+        if certificate.holds:
             return Source("left out", 0.0, "the certificate holds", 0.0)
         words = "not measured: the certificate does not hold, effects='all' leaves nothing out"
-        return Source("left out", math.nan, words, awake_price(self.runs, found))
+        return Source("left out", math.nan, words, awake_price(self.runs, certificate))
 
 
 def awake_price(runs: Any, certificate: Any) -> float:
@@ -123,9 +123,9 @@ def finer_law(law: Any) -> tuple[Any, float]:
         parts = min(2 * geometry.parts, MOST_PARTS)
         if parts == geometry.parts:
             return None, math.nan
-        made = copy.copy(law)
-        made.geometry = BodyGeometry(parts, geometry.outer_faces, geometry.skin)
-        return made, 1.0 / (1.0 - (geometry.parts / parts) ** 2)
+        finer = copy.copy(law)
+        finer.geometry = BodyGeometry(parts, geometry.outer_faces, geometry.skin)
+        return finer, 1.0 / (1.0 - (geometry.parts / parts) ** 2)
     if isinstance(law, SphereContact):
         return BodyContact(_FINE, geometry.outer_faces), 1.0
     return None, math.nan
@@ -134,7 +134,7 @@ def finer_law(law: Any) -> tuple[Any, float]:
 def with_contact(scene: Scene, law: Any) -> Scene:
     """The scene with another contact law."""
     if scene.effects.word == LISTED:
-        effects = [law if one.role == law.role else one for one in scene.effects]
+        effects = [law if effect.role == law.role else effect for effect in scene.effects]
         return replace(scene, effects=effects)
-    loads = [one for one in scene.loads if one.role != law.role]
+    loads = [effect for effect in scene.loads if effect.role != law.role]
     return replace(scene, effects=scene.effects.word, loads=[*loads, law])

@@ -85,9 +85,9 @@ class ErrorParts:
     __repr__ = by_fields
 
     def __str__(self):
-        found = {part.name: largest(getattr(self, part.name)) for part in fields(self)}
-        told = (f"{name} {value:.2g}" for name, value in found.items() if value > 0.0)
-        return ", ".join(told) or "no error found"
+        sizes = {part.name: largest(getattr(self, part.name)) for part in fields(self)}
+        words = (f"{name} {value:.2g}" for name, value in sizes.items() if value > 0.0)
+        return ", ".join(words) or "no error found"
 
 
 @dataclass(frozen=True)
@@ -244,8 +244,8 @@ class Answer(Worded):
     @property
     def larger(self) -> tuple[Source, ...]:
         """Sources that are not in the bar and commonly larger than it."""
-        outside = (one for one in self.sources if not one.measured)
-        return tuple(one for one in outside if one.common > largest(self.error))
+        outside = (source for source in self.sources if not source.measured)
+        return tuple(source for source in outside if source.common > largest(self.error))
 
     @property
     def certificate(self) -> Any:
@@ -266,7 +266,7 @@ class Answer(Worded):
 
     def __str__(self):
         lines = [f"{self._bar()} ({self.parts}{self._unmeasured()}); {self.plan}"]
-        lines += [one.in_words(self.unit) for one in self.sources] + [self.shortfall]
+        lines += [source.in_words(self.unit) for source in self.sources] + [self.shortfall]
         # What the report of the finest run warns of; a Response has none.
         needs = getattr(getattr(self.result, "report", None), "needs", ())
         return "\n".join(filter(None, [*lines, *(f"warning: {need}" for need in needs)]))
@@ -274,12 +274,12 @@ class Answer(Worded):
     __repr__ = __str__
 
     def _unmeasured(self):
-        names = [one.name for one in self.sources if not one.measured]
-        told = [f"; not in the bar: {', '.join(names)}"] if names else []
-        for one in self.larger:
-            share = share_in_words(one.common, self.value, self.unit)
-            told.append(f"; the {one.name} is commonly {share}, more than this bar")
-        return "".join(told)
+        names = [source.name for source in self.sources if not source.measured]
+        lines = [f"; not in the bar: {', '.join(names)}"] if names else []
+        for source in self.larger:
+            share = share_in_words(source.common, self.value, self.unit)
+            lines.append(f"; the {source.name} is commonly {share}, more than this bar")
+        return "".join(lines)
 
     def _bar(self):
         if isinstance(self.value, np.ndarray):
@@ -300,20 +300,20 @@ def doubted(answer: Answer, *reasons: str) -> Answer:
 
 def with_source(answer: Answer, source: Source) -> Answer:
     """The answer with a source of error that no step reduces."""
-    made = replace(answer, sources=(*answer.sources, source))
+    wider = replace(answer, sources=(*answer.sources, source))
     if not source.measured or not np.any(source.error):
-        return made
-    made = replace(made, parts=replace(answer.parts, **{source.name: source.error}))
-    if largest(made.error) <= made.tolerance * largest(made.value):
-        return made
-    told = "" if made.shortfall else f"{100.0 * made.tolerance:g} % was not reached: "
-    moves = f"the {source.name} moves it by {share_in_words(source.error, made.value, made.unit)}"
-    if largest(source.error) > made.tolerance * largest(made.value):
-        return doubted(made, f"{told}{moves}, which no shorter step reduces")
-    if largest(answer.error) > made.tolerance * largest(made.value):
-        return made
-    whole = share_in_words(made.error, made.value, made.unit)
-    return doubted(made, f"{told}{moves}, with the rest the bar is {whole}")
+        return wider
+    wider = replace(wider, parts=replace(answer.parts, **{source.name: source.error}))
+    if largest(wider.error) <= wider.tolerance * largest(wider.value):
+        return wider
+    prefix = "" if wider.shortfall else f"{100.0 * wider.tolerance:g} % was not reached: "
+    moves = f"the {source.name} moves it by {share_in_words(source.error, wider.value, wider.unit)}"
+    if largest(source.error) > wider.tolerance * largest(wider.value):
+        return doubted(wider, f"{prefix}{moves}, which no shorter step reduces")
+    if largest(answer.error) > wider.tolerance * largest(wider.value):
+        return wider
+    whole = share_in_words(wider.error, wider.value, wider.unit)
+    return doubted(wider, f"{prefix}{moves}, with the rest the bar is {whole}")
 
 
 def share_in_words(error: Values, value: Values, unit: str) -> str:
@@ -331,8 +331,10 @@ def branched(
     words = f"no single number: {total} {ends.format(len(branches))}: {each}"
     first = branches[0]
     parts = replace(answer.parts, step=step, chance=first.error, sampling=0.0)
-    told = {"step": np.hypot(step, parts.solver), "chance": first.error, "sampling": 0.0}
-    sources = tuple(replace(one, error=told.get(one.name, one.error)) for one in answer.sources)
+    errors = {"step": np.hypot(step, parts.solver), "chance": first.error, "sampling": 0.0}
+    sources = tuple(
+        replace(source, error=errors.get(source.name, source.error)) for source in answer.sources
+    )
     kept = replace(answer, value=first.value, parts=parts, sources=sources)
     return replace(kept, shortfall=words, branches=branches)
 

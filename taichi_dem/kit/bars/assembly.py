@@ -36,34 +36,34 @@ class Assembly:
 
     def answers(self) -> tuple[Answer, ...]:
         """An answer to each goal."""
-        found = self.rounds[-1][1]
-        return tuple(map(self._answer, range(len(found)), found))
+        estimates = self.rounds[-1][1]
+        return tuple(map(self._answer, range(len(estimates)), estimates))
 
-    def _answer(self, k, found):
-        known, asked, runs, goal = self.known, self.known.question, self.known.runs, found.goal
-        last, total = known.levels[-1], largest(found.parts.total)
-        sources = self._sources(found.parts)
+    def _answer(self, k, estimate):
+        known, asked, runs, goal = self.known, self.known.question, self.known.runs, estimate.goal
+        last, total = known.levels[-1], largest(estimate.parts.total)
+        sources = self._sources(estimate.parts)
         beside = tuple(runs.beside(known.levels[0], last, known.affords))
-        several = largest(found.parts.chance) > found.allowed
+        several = largest(estimate.parts.chance) > estimate.allowed
         parting = runs.parting(known.twin_level, asked.tolerance) if several else math.inf
         doubts = tuple(runs.doubts(goal, known.levels, total, known.affords))
         spent, begin = (self.pilot_s, runs.seconds - self.pilot_s), math.ceil(last) - 1
         short = f"{100.0 * asked.tolerance:g} % was not reached: {known.why}" if known.why else ""
-        made = Answer(
+        answer = Answer(
             goal=goal.name,
             unit=goal.unit,
-            value=found.value,
-            parts=found.parts,
+            value=estimate.value,
+            parts=estimate.parts,
             tolerance=asked.tolerance,
             confidence=asked.confidence,
             plan=Plan(runs.in_words(last, known.seeds), runs.count, *spent, begin, parting),
             result=runs.result(goal, last, known.seeds),
             cost_curve=self._costs(k),
-            shortfall=short if not runs.averaged or found.excess > 1.0 else "",
+            shortfall=short if not runs.averaged or estimate.excess > 1.0 else "",
             sources=sources,
         )
-        made = _told(self._divided(made, found), goal)
-        return doubted(reduce(with_source, beside, made), *doubts)
+        answer = _told(self._divided(answer, estimate), goal)
+        return doubted(reduce(with_source, beside, answer), *doubts)
 
     def _sources(self, parts):
         """Sources of error that runs of this question show, with the CPU time of all of them."""
@@ -73,21 +73,23 @@ class Assembly:
             falling = "2 runs at falling steps, a third of the tolerance at least"
         twins = counted(known.seeds - 1, "twin") if known.seeds > 1 else "nothing can split twins"
         step = Source("step", np.hypot(parts.step, parts.solver), falling, runs.seconds)
-        found = step, Source("chance", parts.chance, twins, 0.0)
+        sources = step, Source("chance", parts.chance, twins, 0.0)
         if not np.ndim(parts.sampling):
-            return found
+            return sources
         words = "what is left of the start, and frequencies around a peak"
-        return *found, Source("sampling", parts.sampling, words, 0.0)
+        return *sources, Source("sampling", parts.sampling, words, 0.0)
 
-    def _divided(self, made, found):
+    def _divided(self, answer, estimate):
         """The answer with its branches, where runs have a few outcomes."""
-        ends = self.known.clusters(found)
+        ends = self.known.clusters(estimate)
         if not ends:
-            return made
+            return answer
         values, clusters = ends
-        step = self.known.errors(found.goal)[0].error
+        step = self.known.errors(estimate.goal)[0].error
         branches = branches_of(values, clusters, self.known.runs.names(len(values)), step)
-        return branched(made, branches, found.parts.step, self.known.runs.run, self.known.runs.ends)
+        return branched(
+            answer, branches, estimate.parts.step, self.known.runs.run, self.known.runs.ends
+        )
 
     def _costs(self, k):
         """Costs of usual tolerances: of the round that had each, or as a power of it."""
@@ -97,22 +99,22 @@ class Assembly:
             return ()
 
         def cost(tolerance):
-            for spent, found in self.rounds:
-                if largest(found[k].parts.total) <= tolerance * largest(found[k].value):
+            for spent, estimates in self.rounds:
+                if largest(estimates[k].parts.total) <= tolerance * largest(estimates[k].value):
                     return Expense(tolerance, spent, True)
             more = (share / tolerance) ** last.power
             return Expense(tolerance, self.pilot_s + (seconds - self.pilot_s) * more, False)
 
         floor = largest(last.parts.chance) / largest(last.value) if self.hopeless else 0.0
         some = sorted({*_TOLERANCES, self.known.question.tolerance}, reverse=True)
-        return tuple(cost(one) for one in some if one >= floor)
+        return tuple(cost(level) for level in some if level >= floor)
 
 
-def _told(made, goal):
+def _told(answer, goal):
     """The answer with numbers in place of arrays, of a goal with one value."""
-    if np.size(made.value) > 1 or goal.kind == "curve":
-        return made
-    parts = {name: float(np.sum(value)) for name, value in vars(made.parts).items()}
-    sources = tuple(replace(one, error=float(np.sum(one.error))) for one in made.sources)
-    value = float(np.sum(made.value))
-    return replace(made, value=value, parts=ErrorParts(**parts), sources=sources)
+    if np.size(answer.value) > 1 or goal.kind == "curve":
+        return answer
+    parts = {name: float(np.sum(value)) for name, value in vars(answer.parts).items()}
+    sources = tuple(replace(source, error=float(np.sum(source.error))) for source in answer.sources)
+    value = float(np.sum(answer.value))
+    return replace(answer, value=value, parts=ErrorParts(**parts), sources=sources)

@@ -52,8 +52,8 @@ class Source:
 
 def named_sources(given: Any, known: Sequence[str]) -> tuple[str, ...]:
     """Names of sources to measure, in the order of the known ones; the first is always measured."""
-    found = several("sources", given, lambda name, one: choice(name, one, known))
-    return tuple(name for name in known if name in (known[0], *found))
+    names = several("sources", given, lambda name, source: choice(name, source, known))
+    return tuple(name for name in known if name in (known[0], *names))
 
 
 def table(sources: Sequence[Source]) -> "pd.DataFrame":
@@ -62,9 +62,9 @@ def table(sources: Sequence[Source]) -> "pd.DataFrame":
     import pandas as pd
 
     columns = {
-        "error": [one.error for one in sources],
-        "in_bar": [one.measured for one in sources],
-        "how": [one.how for one in sources],
-        "cpu_s": [one.seconds for one in sources],
+        "error": [source.error for source in sources],
+        "in_bar": [source.measured for source in sources],
+        "how": [source.how for source in sources],
+        "cpu_s": [source.seconds for source in sources],
     }
-    return pd.DataFrame(columns, index=pd.Index([one.name for one in sources], name="source"))
+    return pd.DataFrame(columns, index=pd.Index([source.name for source in sources], name="source"))

@@ -98,27 +98,27 @@ class Evidence:
 
     def statistics(self, goal, level):
         """Means and standard deviations over the seeds at a level, (2, places)."""
-        found = self.runs.sample(goal, level, self.seeds)
-        return np.array([mean_and_deviation(column) for column in found.T]).T
+        values = self.runs.sample(goal, level, self.seeds)
+        return np.array([mean_and_deviation(column) for column in values.T]).T
 
     def errors(self, goal) -> list[StepError]:
         """Error of the step, one a place."""
         values = np.array([self.value(goal, level) for level in self.levels])
         # An output that changes by less than a usual body's may do so by chance.
         least, smooth = self.runs.least(goal, *self.levels[-2:]), self.smooth(goal)
-        one = float(self.is_whole(goal))
-        made: Any = partial(
+        whole = float(self.is_whole(goal))
+        parts: Any = partial(
             step_error,
             declared=self.runs.order if smooth else 1.0,
             steps=[self.runs.step(level) for level in self.levels],
             smooth=smooth,
             confidence=self.question.confidence,
         )
-        return [made(some, least=max(least * abs(some[-1]), one)) for some in values.T]
+        return [parts(some, least=max(least * abs(some[-1]), whole)) for some in values.T]
 
     def step(self, goal):
         """Half-width by the step, (places,)."""
-        return np.array([one.error for one in self.errors(goal)])
+        return np.array([errors.error for errors in self.errors(goal)])
 
     def is_whole(self, goal):
         """Whether a goal is a whole number that a finer run may change by one."""
@@ -127,7 +127,7 @@ class Evidence:
     def estimate(self, goal) -> GoalEstimate:
         """Estimate of a goal, after runs that tell of chance."""
         runs, last, power = self.runs, self.levels[-1], 2.0
-        step, one = self.step(goal), self.errors(goal)[0]
+        step, errors = self.step(goal), self.errors(goal)[0]
         chance = self._spread(goal) if self.eventful or runs.averaged else np.zeros_like(step)
         allowed, value = self.allowed(goal), self.value(goal, last)
         if self.is_pair:
@@ -136,7 +136,7 @@ class Evidence:
         size = np.abs(value)
         step = np.maximum(step, np.where(size <= runs.rounding(goal), size, 0.0))
         if not runs.averaged:
-            power = 1.0 / (one.order if one.regular else 1.0 if self.eventful else runs.order)
+            power = 1.0 / (errors.order if errors.regular else 1.0 if self.eventful else runs.order)
         parts = ErrorParts(step=step, chance=chance, sampling=runs.sampling(goal, last, self.seeds))
         if step.any() and len(self.levels) > 2 and not self.why:
             parts = self._with_solver(goal, parts)
@@ -164,8 +164,10 @@ class Evidence:
                 return np.full_like(self.value(goal, level), math.inf)
             self.seeds = 2
         if self.seeds == 2 and not averaged and goal.kind != "count":
-            found, allowed = runs.sample(goal, level, 2), self.allowed(goal)
-            apart = abs(found[1] - found[0]) if len(found) > 1 else np.full_like(found[0], math.inf)
+            values, allowed = runs.sample(goal, level, 2), self.allowed(goal)
+            apart = (
+                abs(values[1] - values[0]) if len(values) > 1 else np.full_like(values[0], math.inf)
+            )
             bar = t_quantile(self.question.confidence, 1) * apart
             is_last = len(self.levels) > TRIED
             if largest(bar) <= _NEGLIGIBLE * allowed or (largest(apart) > allowed and not is_last):

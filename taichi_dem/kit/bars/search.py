@@ -47,11 +47,11 @@ class Search:
             self._begin()
             self.pilot_s = known.runs.seconds
             for _ in range(_MOST_ROUNDS):
-                found = [known.estimate(goal) for goal in known.question.goals]
-                if all(one.is_told for one in found):
-                    self.rounds.append((known.runs.seconds, found))
+                estimates = [known.estimate(goal) for goal in known.question.goals]
+                if all(estimate.is_told for estimate in estimates):
+                    self.rounds.append((known.runs.seconds, estimates))
                     seeds, state = known.seeds, known.runs.state()
-                worst = max(found, key=lambda one: one.excess)
+                worst = max(estimates, key=lambda estimate: estimate.excess)
                 if known.why or worst.excess <= 1.0 or not self._narrow(worst):
                     return
             known.why = f"{_MOST_ROUNDS} rounds of longer and more runs were made"
@@ -177,5 +177,5 @@ def _halvings(error, allowed, order):
     return math.inf if math.isinf(ratio) else math.ceil(math.log2(ratio) / order)
 
 
-def _percent(error, found):
-    return share_in_words(error, found.value, found.goal.unit)
+def _percent(error, value):
+    return share_in_words(error, value.value, value.goal.unit)

@@ -63,12 +63,12 @@ def _order(values, steps, most):
     before, after = values[1] - values[0], values[2] - values[1]
     if after == 0.0:
         return math.nan
-    found, low, high = before / after, 1e-3, most
-    if not _ratio(steps, low) <= found <= _ratio(steps, high):
+    ratio, low, high = before / after, 1e-3, most
+    if not _ratio(steps, low) <= ratio <= _ratio(steps, high):
         return math.nan
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _ratio(steps, middle) < found else (low, middle)
+        low, high = (middle, high) if _ratio(steps, middle) < ratio else (low, middle)
     return high
 
 
