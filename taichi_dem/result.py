@@ -14,7 +14,7 @@ from taichi_dem.kit.data_table import arrays_of, data_frame
 from taichi_dem.kit.display import Pictured, counted, embedded, in_brief, titled, verbatim
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
-from taichi_dem.kit.validation import FileName, direction, fraction, positive, whole
+from taichi_dem.kit.validation import FileName, direction, flag, fraction, positive, whole
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.mesh.mesh import Mesh
@@ -289,7 +289,7 @@ class Result:
             )
         return attenuation_of(self.model, self.peak_speed, group, radius)
 
-    def write(self, folder: FileName) -> None:
+    def write(self, folder: FileName, *, single: bool = False) -> None:
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.
 
         With receivers, receivers.csv too. The series, in paraview/ of that folder, has the folder's
@@ -299,7 +299,10 @@ class Result:
         ----------
         folder : path
             Folder; a leading "~" is the user's home.
+        single : bool, default False
+            Of the ParaView series, see ``write_paraview``.
         """
+        flag("single", single)
         folder = output_folder(folder)
         place, name = os.path.join(folder, "paraview"), series_name(folder)
         remove_series(place, name)
@@ -312,7 +315,8 @@ class Result:
         if self.receivers:
             write_receivers(os.path.join(folder, "receivers.csv"), self.receivers)
         if self.frames:
-            write_paraview(place, self.model, self.frames, name, self.acting_since)
+            given = self.model, self.frames, name, self.acting_since
+            write_paraview(place, *given, single=single)
 
     def show(self, path: FileName | None = None, *, open_browser: bool | None = None) -> WebPage:
         """Write one HTML page in which the block turns and its frames play, without a network.

@@ -189,7 +189,7 @@ class BroadPhase:
 
     @ti.func
     def _begin(self, one):
-        self.neighbours.begin()
+        self.neighbours.begin(self.free_count[None])
         self.searched[None] = self.state.tick[None]
         self.store.pack_if_sparse()
 
@@ -207,6 +207,7 @@ class BroadPhase:
             self.breaks.end_search()
         # A full row of neighbours requires another search, which rebuilds the list.
         again = self.neighbours.stale[None] != 0 and self.full[None] == 0
+        again = again and self.free_count[None] > 0
         self.contacts.search_requested[None] = ti.cast(again, ti.i32)
 
     @ti.func

@@ -50,14 +50,15 @@ class VerletList:
         assign(self.changed, 1)
 
     @ti.func
-    def begin(self):
-        """Decide whether so many bodies have left their reach that the list is rebuilt."""
+    def begin(self, free):
+        """Decide whether the list is rebuilt; free: number of bodies that others can touch."""
         self.lacking[None] = 0
         if self.reach.escaped_count[None] > ti.min(
             self.tables.body_count[None] // 16, MOST_ESCAPED
         ):
             self.stale[None] = STALE
-        if self.stale[None] == STALE:
+        # A solid in one piece has no use of it before its first break.
+        if self.stale[None] == STALE and free > 0:
             self.stale[None] = MAKING
 
     @ti.func

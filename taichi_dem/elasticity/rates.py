@@ -22,7 +22,13 @@ from taichi_dem.materials.bond_rules import Constant, Density, per_bond
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors, signed_volumes, unit_normals
-from taichi_dem.mesh.topology import Topology, body_properties, face_vertices, spheres_of_faces
+from taichi_dem.mesh.topology import (
+    Topology,
+    body_properties,
+    face_vertices,
+    interior_crossings,
+    spheres_of_faces,
+)
 
 #: Rings of bodies around a face over which its moduli are means.
 _RINGS = 2
@@ -51,12 +57,25 @@ def bond_rates(
     topology: Topology,
     density: Density,
     coefficients: tuple[Constant, Constant],
-    multiply: object = product,
+    multiply: Any = product,
+    bodies: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,)."""
+    """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,); else 0 for some."""
     # G: sum of (A / 3) J^T diag(normal, tangential) J over the contact units of all bonds, with
     # neighbours at rest (Konno et al., section 2.1); M: mass and inertia.
-    return subset_rates(mesh, topology, density, coefficients, (15,), multiply)[:, 0]
+    return subset_rates(mesh, topology, density, coefficients, (15,), multiply, bodies)[:, 0]
+
+
+def bond_bounds(
+    mesh: Mesh, topology: Topology, density: Density, coefficients: tuple[Constant, Constant]
+) -> np.ndarray:
+    """Bound of ``bond_rates`` from above, the sum of all eigenvalues: in a fifth of the time."""
+    mass, centre, inertia = body_properties(mesh, density)
+    corners, normals, area = _faces(mesh, centre)
+    laws = np.append(per_bond(mesh, topology, density, coefficients), [[0.0, 0.0]], axis=0)
+    weights = area / 3.0 * np.moveaxis(laws[topology.body_bond], -1, 0)
+    sums = _eigenvalue_sums(mass, inertia, corners, normals, *weights[..., None])
+    return sums.sum(axis=1)
 
 
 def subset_rates(
@@ -65,16 +84,18 @@ def subset_rates(
     density: Density,
     coefficients: tuple[Constant, Constant],
     subsets: Sequence[int] = range(16),
-    multiply: object = product,
+    multiply: Any = product,
+    bodies: np.ndarray | None = None,
 ) -> np.ndarray:
     """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets))."""
-    root, blocks = _roots_and_blocks(mesh, topology, density, coefficients, multiply)
+    chosen = np.arange(mesh.body_count) if bodies is None else bodies
+    root, blocks = _roots_and_blocks(mesh, topology, density, coefficients, multiply, chosen)
     rates = np.zeros((mesh.body_count, len(subsets)))
-    for part in parts_in_cache(mesh.body_count):
+    for part in parts_in_cache(len(chosen)):
         for column, subset in enumerate(subsets):
             intact = [face for face in range(4) if subset >> face & 1]
             total = blocks[part][:, intact].sum(axis=1)
-            rates[part, column] = scaled_eigenvalues(root[part], total, multiply)
+            rates[chosen[part], column] = scaled_eigenvalues(root[part], total, multiply)
     return np.maximum(rates, 0.0)
 
 
@@ -85,16 +106,17 @@ def largest_bond_rate(
     return float(bond_rates(mesh, topology, density, coefficients, np.matmul).max())
 
 
-def _roots_and_blocks(mesh, topology, density, coefficients, multiply):
-    """``inverse_root`` of every body, (n, 6, 6), and the blocks of its four bonds, (n, 4, 6, 6)."""
-    mass, centre, inertia = body_properties(mesh, density)
-    body, face = np.nonzero(topology.body_bond >= 0)
-    laws = per_bond(mesh, topology, density, coefficients)[topology.body_bond[body, face]]
-    blocks = np.zeros((mesh.body_count, 4, 6, 6))
-    vertices = face_vertices(mesh, body, face)
+def _roots_and_blocks(mesh, topology, density, coefficients, multiply, bodies):
+    """``inverse_root`` of bodies, (n, 6, 6), and the blocks of their four bonds, (n, 4, 6, 6)."""
+    mass, centre, inertia = (of_all[bodies] for of_all in body_properties(mesh, density))
+    bonds = topology.body_bond[bodies]
+    row, face = np.nonzero(bonds >= 0)
+    laws = per_bond(mesh, topology, density, coefficients)[bonds[row, face]]
+    blocks = np.zeros((len(bodies), 4, 6, 6))
+    vertices = face_vertices(mesh, bodies[row], face)
     area, law = face_laws(mesh.points, vertices, laws)
-    arms = mesh.points[vertices] - centre[body][:, None]
-    blocks[body, face] = area[:, None, None] / 3.0 * point_blocks(arms, law, multiply)
+    arms = mesh.points[vertices] - centre[row][:, None]
+    blocks[row, face] = area[:, None, None] / 3.0 * point_blocks(arms, law, multiply)
     return inverse_root(mass, inertia), blocks
 
 
@@ -110,23 +132,63 @@ def face_laws(
     return area, across * np.eye(3) + (normally - across) * along
 
 
+def _faces(mesh, centre):
+    """Corners from the centre of each body (n, 4, 3, 3) [m], normals and areas of its faces."""
+    faces = geometry.all_faces(mesh.tetrahedra)
+    vector = area_vectors(mesh.points, faces).reshape(-1, 4, 3)
+    area = length(vector)
+    corners = mesh.points[faces].reshape(-1, 4, 3, 3) - centre[:, None, None]
+    return corners, vector / area[..., None], area
+
+
+def _eigenvalue_sums(mass, inertia, arms, normals, normally, across):
+    """Sum of the eigenvalues that points of each face give its body, (n, 4).
+
+    arms: of the points (n, 4, k, 3). normally, across: what resists a velocity there, along the
+    normal of the face and along each tangent.
+    """
+    slack, ease = 1.0 / mass[:, None, None], inverse(inertia)[:, None]
+    turn = np.cross(arms, normals[:, :, None])
+    along = slack + dot(turn, turn @ ease)
+    whole = np.trace(ease, axis1=2, axis2=3)[..., None]
+    both = 3.0 * slack + dot(arms, arms) * whole - dot(arms, arms @ ease)
+    return (normally * along + across * (both - along)).sum(axis=2)
+
+
+def contact_bounds(mesh: Mesh, density: Density, divisions: int, friction: bool) -> np.ndarray:
+    """Bound of ``contact_eigenvalues`` from above, the sum of all eigenvalues."""
+    mass, centre, inertia = body_properties(mesh, density)
+    corners, normals, _ = _faces(mesh, centre)
+    points = interior_crossings(divisions) @ corners
+    return _eigenvalue_sums(mass, inertia, points, normals, 1.0, float(friction)).max(axis=1)
+
+
 def contact_eigenvalues(
-    mesh: Mesh, density: Density, divisions: int, friction: bool, multiply: object = product
+    mesh: Mesh,
+    density: Density,
+    divisions: int,
+    friction: bool,
+    multiply: Any = product,
+    bodies: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Largest eigenvalue of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], (n,)."""
+    """Largest eigenvalue of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], (n,); else 0 for some."""
+    chosen = np.arange(mesh.body_count) if bodies is None else bodies
+    largest = np.zeros(mesh.body_count)
+    if not len(chosen):
+        return largest
     mass, centre, inertia = body_properties(mesh, density)
     spheres = spheres_of_faces(mesh, centre, divisions)
-    root = inverse_root(mass, inertia)
-    largest = np.zeros(len(mass))
+    root = inverse_root(mass[chosen], inertia[chosen])
     faces = geometry.all_faces(mesh.tetrahedra)
     normals = geometry.unit_normals(mesh.points, faces).reshape(-1, 4, 3)
     for face in range(4):
-        outward = normals[:, face]
-        arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
+        outward, radius = normals[chosen, face], spheres.radius[chosen, face, :, None]
+        arms = spheres.centre[chosen, face] + radius * outward[:, None]
         along = outward[:, :, None] * outward[:, None, :]
         law = np.broadcast_to(np.eye(3), along.shape) if friction else along
         blocks = point_blocks(arms, law, multiply)
-        largest = np.maximum(largest, scaled_eigenvalues(root, blocks, multiply))
+        found = scaled_eigenvalues(root, blocks, multiply)
+        largest[chosen] = np.maximum(largest[chosen], found)
     return largest
 
 
@@ -150,7 +212,7 @@ def levers(arms: np.ndarray) -> np.ndarray:
 
 
 def scaled_eigenvalues(
-    root: np.ndarray, blocks: np.ndarray, multiply: object = product
+    root: np.ndarray, blocks: np.ndarray, multiply: Any = product
 ) -> np.ndarray:
     """Largest eigenvalue of root G root^T for every 6x6 block G, shape (n,)."""
     if multiply is not product:

@@ -12,7 +12,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
 from taichi_dem.kit.fixed_order import largest_eigenvalues
-from taichi_dem.kit.validation import FileName, file_stem, instance, several
+from taichi_dem.kit.validation import FileName, file_stem, flag, instance, several
 from taichi_dem.loads.pressure import GasPressure
 from taichi_dem.mesh.files import write_pvd, write_vtu
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -310,6 +310,8 @@ def write_paraview(
     frames: Sequence[Frame],
     name: str | None = None,
     acting_since: Mapping[str, np.ndarray] | None = None,
+    *,
+    single: bool = False,
 ) -> None:
     """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
 
@@ -325,6 +327,8 @@ def write_paraview(
         Name of the files; that of the folder if None.
     acting_since : mapping, optional
         When effects acted first on each body [s], by name; cells then carry NAME_since_s.
+    single : bool, default False
+        Real numbers of 4 bytes, seven digits, and compressed: for small files.
 
     Notes
     -----
@@ -335,6 +339,7 @@ def write_paraview(
     instance("model", model, Model)
     frames = several("frames", frames, lambda what, one: instance(what, one, Frame))
     instance("acting_since", acting_since, (Mapping, type(None)))
+    flag("single", single)
     folder = output_folder(folder)
     name = series_name(folder) if name is None else file_stem("name", name)
     remove_series(folder, name)
@@ -344,5 +349,5 @@ def write_paraview(
         names.append(f"{name}_{number:04d}.vtu")
         points = body_corners(model, frame).reshape(-1, 3)
         data = cell_data(model, frame, acting_since or {})
-        write_vtu(os.path.join(folder, names[-1]), points, cells, data)
+        write_vtu(os.path.join(folder, names[-1]), points, cells, data, single)
     write_pvd(os.path.join(folder, f"{name}.pvd"), [frame.time_s for frame in frames], names)

@@ -1,9 +1,17 @@
 """Limits of mesh and step in a run: slip of unbroken bonds, dashpots, late failures."""
 
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
+from taichi_dem.elasticity.rates import (
+    bond_bounds,
+    bond_rates,
+    contact_bounds,
+    contact_eigenvalues,
+)
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import counted
 from taichi_dem.laws.contracts import UnitLaw
@@ -47,14 +55,41 @@ _TOO_LONG = (
 _LINKS, ROUNDING = ("bonds", "contact"), 1e-6
 
 
-def limits_of(run: Run) -> dict[str, np.ndarray]:
-    """Largest stable steps [s] of each body by criterion, see ``StepReport``; but for last bits."""
+def limits_of(run: Run, *bodies: np.ndarray) -> dict[str, np.ndarray]:
+    """Largest stable steps [s] by criterion, see ``StepReport``; but for last bits.
+
+    bodies: those that are asked for in bonds and in contact; others have infinite steps.
+    """
+    kinds: tuple[Any, Any] = bond_rates, contact_eigenvalues
+    asked = bodies or (None, None)
+    return _limits(run, *(partial(of, multiply=np.matmul, bodies=b) for of, b in zip(kinds, asked)))
+
+
+def _limits(run, *rates):
     model = run.model
     dashpot, friction, contact = (
         next((effect for effect in model.by_role[role] if effect.name), None)
         for role in ("dashpot", "friction", "contact")
     )
-    return step_limits(model.mesh, model.materials, dashpot, friction, contact, np.matmul)
+    if way_of(run) == "solved":
+        dashpot = None
+    return step_limits(model.mesh, model.materials, dashpot, friction, contact, *rates)
+
+
+def longest_steps(run: Run) -> np.ndarray:
+    """Largest stable step of each body in bonds and in contact [s], (2, n).
+
+    Infinite where bounds of the rates, which cost little, show that no step of the run exceeds it.
+    """
+    sure = _by_link(run, _limits(run, bond_bounds, contact_bounds))
+    short = sure < run.schedule.dt0
+    if not short.any():
+        return np.full_like(sure, np.inf)
+    return _by_link(run, limits_of(run, *map(np.flatnonzero, short)))
+
+
+def _by_link(run, limits):
+    return np.array([stable_steps(limits, way_of(run), link) for link in ("bond", "contact")])
 
 
 def way_of(run: Run) -> str:
@@ -101,10 +136,7 @@ class StepResolution(Kept):
 
     def __init__(self, run: Run):
         self.run, bodies = run, run.model.body_count
-        self.longest = np.full((2, bodies), np.inf)
-        if is_bounded(run):
-            limits, way = limits_of(run), way_of(run)
-            self.longest[:] = [stable_steps(limits, way, link) for link in ("bond", "contact")]
+        self.longest = longest_steps(run) if is_bounded(run) else np.full((2, bodies), np.inf)
         self.over = np.zeros_like(self.longest)
         self.slip = np.array([0.0, -1.0, 0.0, 0.0])
         self.share, self.pair_share = np.ones(run.model.bond_count), np.ones(bodies)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,6 @@ from numpy.typing import ArrayLike
 from taichi_dem.elasticity.mesh_stiffness import MeshStiffness, mesh_stiffness
 from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.fixed_order import product
 from taichi_dem.kit.terminal import aligned
 from taichi_dem.kit.validation import instance
 from taichi_dem.materials import Material
@@ -176,28 +176,28 @@ def step_limits(
     dashpot: Any,
     friction: Any,
     contact: Any,
-    multiply: Any = product,
+    rates: Callable = bond_rates,
+    eigenvalues: Callable = contact_eigenvalues,
 ) -> dict[str, np.ndarray]:
     """Largest steps [s] of each body by criterion; dashpot, friction, contact: effects or None."""
-    limits = bond_steps(mesh, material, multiply, bool(dashpot))
+    limits = bond_steps(mesh, material, rates, bool(dashpot))
     if contact is not None:
         stiffness, damping = contact.strongest(mesh, material)
         of_faces = mesh, material.density, contact.geometry.divisions, bool(friction)
-        whole_face = contact_eigenvalues(*of_faces, multiply)
+        whole_face = eigenvalues(*of_faces)
         limits["contact_stiffness"] = spring_step(stiffness * whole_face)
         limits["contact_dashpot"] = dashpot_step(damping * whole_face)
     return limits
 
 
 def bond_steps(
-    mesh: Mesh, material: AnyMaterial, multiply: object = product, damped: bool = True
+    mesh: Mesh, material: AnyMaterial, rates: Callable = bond_rates, damped: bool = True
 ) -> dict[str, np.ndarray]:
     """Largest steps [s] that the springs and the dashpots of the bonds of each body allow."""
     of_bonds = mesh, topology_of(mesh), material.density
-    steps = {"bond_stiffness": spring_step(bond_rates(*of_bonds, springs_of(material), multiply))}
+    steps = {"bond_stiffness": spring_step(rates(*of_bonds, springs_of(material)))}
     if damped:
-        rates = bond_rates(*of_bonds, dashpots_of(material), multiply)
-        steps["bond_dashpot"] = dashpot_step(rates)
+        steps["bond_dashpot"] = dashpot_step(rates(*of_bonds, dashpots_of(material)))
     return steps
 
 

@@ -27,9 +27,11 @@ from taichi_dem import (
     write_paraview,
 )
 from taichi_dem.kit.display import BRIEF
+from taichi_dem.mesh.files import write_vtu
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.tetrahedra import signed_volumes
 from taichi_dem.output.fracture import fragment_of_body, strike_and_dip
+from taichi_dem.output.record import body_corners, cell_data
 from tests.made_result import made_result
 
 NAN, SEED = float("nan"), 2
@@ -98,14 +100,37 @@ def test_attenuation_is_fitted_to_what_there_is():
     assert np.isnan(fall.attenuation().power_law(4.0)).all()
 
 
-def test_a_series_for_paraview_holds_bodies_and_their_stress(result, tmp_path):
-    write_paraview(tmp_path, result.model, result.frames, "run", result.acting_since)
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_a_series_for_paraview_holds_bodies_and_their_data(result, tmp_path, kind):
+    given = result.model, result.frames, "run", result.acting_since
+    write_paraview(tmp_path, *given, single=kind is np.float32)
     for k, frame in enumerate(result.frames):
         vtu = meshio.read(tmp_path / f"run_{k:04d}.vtu")
         assert vtu.cells[0].data.shape == (result.model.body_count, 4)
-        (stress,), (largest,) = (vtu.cell_data[f"{name}stress_Pa"] for name in ("", "largest_"))
-        assert np.array_equal(stress.reshape(-1, 3, 3), frame.stress)
-        assert largest == pytest.approx(np.linalg.eigvalsh(frame.stress)[:, 2], rel=1e-12)
+        points = body_corners(result.model, frame).reshape(-1, 3)
+        assert np.array_equal(vtu.points, points.astype(kind))
+        for name, wanted in cell_data(result.model, frame, result.acting_since).items():
+            (found,) = vtu.cell_data[name]
+            wanted = wanted.astype(kind) if wanted.dtype == float else wanted
+            assert np.array_equal(found, wanted, equal_nan=wanted.dtype == kind), name
+        largest = np.linalg.eigvalsh(frame.stress)[:, 2]
+        assert frame.largest_stress == pytest.approx(largest, rel=1e-12)
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("count", range(1, 30))
+def test_a_file_for_paraview_is_read_back_whatever_its_length(count, single, tmp_path):
+    random = np.random.default_rng(count)
+
+    def drawn(*shape):
+        return random.normal(size=shape).astype(np.float32 if single else np.float64)
+
+    points, cells = drawn(4 * count, 3), np.arange(4 * count).reshape(-1, 4)
+    data = {"a": drawn(count), "b": drawn(count, 9), "c": cells[:, 0]}
+    write_vtu(tmp_path / "one.vtu", points, cells.astype(np.int32), data, single)
+    vtu = meshio.read(tmp_path / "one.vtu")
+    assert np.array_equal(vtu.points, points) and np.array_equal(vtu.cells[0].data, cells)
+    assert all(np.array_equal(vtu.cell_data[name][0], data[name]) for name in data)
 
 
 def test_a_report_is_brief_and_loses_nothing(flown):

@@ -10,6 +10,7 @@ import taichi as ti
 from cases.closed_forms import LinearBonds, carried
 from taichi_dem import (
     CONCRETE,
+    PAPER_BLOCK,
     ImplicitDashpots,
     Multirate,
     Scene,
@@ -17,10 +18,18 @@ from taichi_dem import (
     StepControl,
     Uniform,
     effects,
+    read_mesh,
     simulate,
     step_report,
 )
-from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
+from taichi_dem.elasticity.rates import (
+    bond_bounds,
+    bond_rates,
+    contact_bounds,
+    contact_eigenvalues,
+    dashpots_of,
+    springs_of,
+)
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
@@ -104,6 +113,35 @@ def test_bond_limits_are_where_motion_begins_to_grow(kind):
     assert found == pytest.approx(exact, rel=0.007), found / exact
     formula = limit(bond_rates(model.mesh, topology_of(model.mesh), CONCRETE.density, of(material)))
     assert formula.max() <= exact * (1 + 1e-9) < 2.0 * formula.min()
+
+
+@pytest.mark.parametrize("friction", [False, True])
+def test_the_bounds_of_rates_are_the_sums_of_eigenvalues(friction):
+    """No eigenvalue is negative: their sum is at least the largest, and at most all six of it.
+
+    A body that meets others in one point without friction has one eigenvalue other than zero.
+    """
+    mesh = read_mesh(PAPER_BLOCK)
+    for of in (springs_of, dashpots_of):
+        given = mesh, topology_of(mesh), CONCRETE.density, of(CONCRETE)
+        share = bond_bounds(*given) / bond_rates(*given, np.matmul)
+        assert 1.0 < share.min() and share.max() < 6.0
+    for divisions in (3, 5):
+        met = mesh, CONCRETE.density, divisions, friction
+        share = contact_bounds(*met) / contact_eigenvalues(*met, np.matmul)
+        assert share.min() > 1.0 - 1e-9 and share.max() < 6.0
+        assert friction or divisions > 3 or share.max() < 1.0 + 1e-9
+
+
+def test_rates_of_some_bodies_are_those_of_all():
+    """Where bounds leave open whether a step is stable, rates are found for these bodies alone."""
+    mesh, some = read_mesh(PAPER_BLOCK), np.array([3, 500, 965])
+    given = mesh, topology_of(mesh), CONCRETE.density, springs_of(CONCRETE)
+    met = mesh, CONCRETE.density, 3, True
+    for rates, of in ((bond_rates, given), (contact_eigenvalues, met)):
+        found = rates(*of, bodies=some)
+        assert np.array_equal(found[some], rates(*of)[some])
+        assert np.count_nonzero(found) == len(some)
 
 
 #: A method for every way of taking dashpots, and how far above what is told motion surely grows:
