@@ -29,13 +29,14 @@ def strengths(effort):
     rows = strength(TENSION, [None]) / STRENGTH
     words = "direct tension over the strength of a bond"
     bonds = partial(Number, published=1.0, source="one bond", allowed=0.03)
-    elastic, rock = "an elastic disc, 2 P / (pi D t)", "rock and concrete, 8 to 20"
     split_words = "Brazilian strength over direct tension, flat strips of 10 degrees"
-    pressed_words = "strength in compression over that of a bond"
+    elastic = {"source": "an elastic disc, 2 P / (pi D t)", "allowed": 0.1}
+    small = "the disc is twice as wide as E G / f_t^2"
+    pressed_words, rock = "compression over the strength of a bond", "rock and concrete, 8 to 20"
     return [
         bonds("strength_tension", words, values=tension / STRENGTH),
         bonds("strength_in_rows", f"{words}, mesh in rows", values=rows),
-        Number("strength_split", split_words, 1.0, split / tension, source=elastic, allowed=0.1),
+        Number("strength_split", split_words, 1.0, split / tension, miss=small, **elastic),
         Number("strength_pressed", pressed_words, 14.0, pressed, 8.0, 20.0, source=rock),
     ], {}
 
