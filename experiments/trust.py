@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from cases.trust import Effort, bonds, contacts, cracks, waves
+from cases.trust import Effort, beams, bonds, contacts, cracks, waves
 from cases.trust import blast as blasts
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
@@ -28,8 +28,8 @@ from taichi_dem.kit.progress_bar import ProgressBar
 NAME = "trust"
 #: In the order of the page.
 MEASURES = (
-    *(waves.bar_wave, waves.spall, bonds.disc, cracks.crack, cracks.branching),
-    *(bonds.joint, blasts.blast, contacts.slope, contacts.rotation),
+    *(waves.bar_wave, waves.spall, bonds.strengths, beams.beams),
+    *(cracks.branching, bonds.joint, blasts.blast, contacts.slope, contacts.rotation),
 )
 CASES = {measure.__name__: measure for measure in MEASURES}
 QUICK = ("bar_wave", "joint", "rotation")

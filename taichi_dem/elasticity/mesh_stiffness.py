@@ -179,7 +179,7 @@ def motions_under(
     mesh: Mesh, topology: Topology, springs: np.ndarray, forces: np.ndarray
 ) -> np.ndarray:
     """Motions of rigid bodies joined by linear springs, up to rigid motions of each part."""
-    own, rows, neighbour = _blocks(mesh, topology, springs)
+    own, rows, neighbour = bond_blocks(mesh, topology, springs)
     solved, rest = np.zeros(forces.shape), forces.copy()
     alone = (own == 0.0).all(axis=(1, 2))
     # Forces on a body without bonds are balanced: what is left of them is rounding.
@@ -204,7 +204,9 @@ def motions_under(
     )
 
 
-def _blocks(mesh, topology, springs):
+def bond_blocks(
+    mesh: Mesh, topology: Topology, springs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Forces on each body by its own motion (bodies, 6, 6) and its neighbours' (bodies, 6, 24)."""
     _, centre, _ = body_properties(mesh, 1.0)
     corners = mesh.points[topology.vertices]

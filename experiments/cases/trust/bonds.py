@@ -1,54 +1,50 @@
-"""Bonds that part: both strengths of a rock and their ratio, and a joint in mixed modes."""
+"""Bonds that part: strengths of specimens by those of bonds, and a joint in mixed modes."""
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from cases.strength_tests import TESTS
-from cases.strength_tests import disc as disc_mesh
+from cases.strength_tests import BRAZILIAN, COMPRESSION, TENSION
 from cases.trust import Number
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import checked_mesh, with_inner_group
 from taichi_dem.mesh.shapes import bar
 
-GRANITE = "Lac du Bonnet granite, Potyondy and Cundall, IJRMMS 41 (2004) 1329"
-#: Strength in the Brazilian test over that in direct tension, and what counts as agreement.
-RATIO, ALLOWED = 1.28, 0.15
-#: Half of the angle of the arcs that load a disc [degrees]: between curved jaws, and twice as wide.
-ARCS = 5.0, 10.0
 #: Edge of an element [m]; E [Pa], nu, rho [kg/m3], strength [Pa] and fracture energy [J/m2] of a
 #: bond, friction [degrees], cohesion [Pa], share of critical damping.
 EDGE, STRENGTH = 5e-3, 8e6
 ROCK = {
     **{"young": 69e9, "poisson": 0.2, "density": 2630.0, "tensile_strength": STRENGTH},
-    **{"fracture_energy": 30.0, "friction_angle": 30.0, "cohesion": 40e6, "damping_ratio": 0.1},
+    **{"fracture_energy": 30.0, "friction_angle": 30.0, "cohesion": 24e6, "damping_ratio": 0.1},
 }
+#: About what compression takes, over the strength of bonds.
+PRESSED = 14.0
 
 
-def disc(effort):
-    """Ratio of both strengths for two widths of the load, and direct tension over a bond's."""
-    loaded = [replace(TESTS["brazilian"], specimen=partial(disc_mesh, arc=arc)) for arc in ARCS]
-    tension, *brazilian = (
-        np.array([strength(test, seed) for seed in effort.seeds])
-        for test in (TESTS["tension"], *loaded)
-    )
-    misses = "", "a wide load holds the disc together beside the split"
-    row = partial(Number, source=GRANITE, allowed=ALLOWED)
-    words = "Brazilian strength over direct tension, arcs of {:g} degrees"
-    numbers = [
-        row(f"disc_ratio_{2 * arc:g}", words.format(2 * arc), RATIO, found / tension, miss=miss)
-        for arc, found, miss in zip(ARCS, brazilian, misses)
-    ]
+def strengths(effort):
+    """Strengths of specimens over those of bonds, scattered and in rows."""
+    tension, split = (strength(test, effort.seeds) for test in (TENSION, BRAZILIAN))
+    pressed = strength(COMPRESSION, effort.seeds, PRESSED) / STRENGTH
+    rows = strength(TENSION, [None]) / STRENGTH
     words = "direct tension over the strength of a bond"
-    numbers.append(Number("disc_tension", words, 1.0, tension / STRENGTH, source="one bond"))
-    return numbers, {}
+    bonds = partial(Number, published=1.0, source="one bond", allowed=0.03)
+    split_words = "Brazilian strength over direct tension, flat strips of 10 degrees"
+    elastic = {"source": "an elastic disc, 2 P / (pi D t)", "allowed": 0.1}
+    small = "the disc is twice as wide as E G / f_t^2"
+    pressed_words, rock = "compression over the strength of a bond", "rock and concrete, 8 to 20"
+    return [
+        bonds("strength_tension", words, values=tension / STRENGTH),
+        bonds("strength_in_rows", f"{words}, mesh in rows", values=rows),
+        Number("strength_split", split_words, 1.0, split / tension, miss=small, **elastic),
+        Number("strength_pressed", pressed_words, 14.0, pressed, 8.0, 20.0, source=rock),
+    ], {}
 
 
-def strength(test, seed):
-    """Strength of a random specimen [Pa]."""
-    return test.strength(Material.from_elastic(**ROCK), EDGE, STRENGTH, seed, None)
+def strength(test, seeds, expected=1.0):
+    """Strengths of specimens [Pa]; expected: over that of a bond."""
+    rock, much = Material.from_elastic(**ROCK), expected * STRENGTH
+    return np.array([test.strength(rock, EDGE, much, seed) for seed in seeds])
 
 
 MIXED = "Benzeggagh and Kenane, Compos. Sci. Technol. 56 (1996) 439"
