@@ -68,8 +68,8 @@ class BlastEngine(Engine):
         self.schedule = Schedule(self.tables, self.state, self.contacts, method)
         search = None
         if self.contacts is not None:
-            told = self.schedule.pair_phases(), self.schedule.limits
-            search = BroadPhase(self.contacts, *told)
+            listeners = self.schedule.pair_phases(), self.schedule.limits
+            search = BroadPhase(self.contacts, *listeners)
         self.broad_phase = search
         # A method may have a step of its own (docs/add_a_time_integrator.md).
         chosen: Any = getattr(method, "step", ExplicitStep)

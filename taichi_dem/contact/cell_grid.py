@@ -36,8 +36,8 @@ class Reach:
     @ti.func
     def notice(self, i):
         """Note whether body i, which is being searched, has left its reach."""
-        way = norm(self.state.position[i] - self.placed_at[i])
-        if not way + self.contacts.body_skin[i] < self.reach[i]:
+        moved = norm(self.state.position[i] - self.placed_at[i])
+        if not moved + self.contacts.body_skin[i] < self.reach[i]:
             self.left[i] = 1
             self.escaped[ti.atomic_add(self.escaped_count[None], 1)] = i
             self.note_place(i)
@@ -143,15 +143,15 @@ class CellGrid:
         self.bounds[c] = ti.Matrix.rows([low, high, [total, largest, 0.0]])
 
     @ti.func
-    def _size(self, one):
+    def _size(self, item):
         """Choose cells about as wide as one of the balls."""
         first, count = self.bounds[0], self.tables.body_count[None]
         low, high, total, largest = first[0, :], first[1, :], 0.0, 0.0
         for c in range(self.chunks.count(0)):
-            found = self.bounds[c]
-            low, high = ti.min(low, found[0, :]), ti.max(high, found[1, :])
-            total += found[2, 0]
-            largest = ti.max(largest, found[2, 1])
+            box = self.bounds[c]
+            low, high = ti.min(low, box[0, :]), ti.max(high, box[1, :])
+            total += box[2, 0]
+            largest = ti.max(largest, box[2, 1])
         edge = 2.0 * total / count
         while _product(ti.floor((high - low) / edge) + 1.0) > 4 * count + 64:
             edge *= 1.25

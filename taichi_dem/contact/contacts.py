@@ -162,8 +162,8 @@ class Contacts:
         """Set the body skin of body i: half the skin, or more where it is fast."""
         # A few fragments are much faster than the rest and would cause most of the searches.
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
-        way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
-        self.body_skin[i] = ti.max(0.5 * self.skin[i], way)
+        skin = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
+        self.body_skin[i] = ti.max(0.5 * self.skin[i], skin)
         self.horizon[i] = self.path[i] + self.body_skin[i]
 
     @ti.func
@@ -266,7 +266,7 @@ class Breaks:
                     self.is_open[self.corner[4 * i + (f + c) % 4]] = 1
 
     @ti.func
-    def _end(self, one):
+    def _end(self, item):
         # A second search at the tick of a break must not book its injection again.
         self.fresh[None] = ti.cast(self.latest[None] > self.state.injected_tick[None], ti.i32)
         if self.contacts.outer_waits[None] == ENDING:

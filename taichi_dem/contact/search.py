@@ -188,19 +188,19 @@ class BroadPhase:
         return self.neighbours.amending() * self.tables.body_count[None]
 
     @ti.func
-    def _begin(self, one):
+    def _begin(self, item):
         self.neighbours.begin(self.free_count[None])
         self.searched[None] = self.state.tick[None]
         self.store.pack_if_sparse()
 
     @ti.func
-    def _end_pairs(self, one):
+    def _end_pairs(self, item):
         """Take over the numbers of pairs."""
         self.neighbours.end()
         self.near_pairs.end()
 
     @ti.func
-    def _end(self, one):
+    def _end(self, item):
         if self.full[None] == 0:
             self.everywhere[None], self.again[None] = 0, 0
             self.searches[None] = self.searches[None] + 1

@@ -101,7 +101,7 @@ class VerletList:
         self.first[self.tables.body_count[None]] = total[0]
 
     @ti.func
-    def check_room(self, one):
+    def check_room(self, item):
         """Empty all rows where they exceed the room, and note how long they would be."""
         if self.making() == 1:
             n = self.tables.body_count[None]
@@ -280,12 +280,12 @@ class NearPairs:
         if self.row_is_new[i] == 1:
             count, spheres, waiting, wanted = 0, 0, 0, ivec3(0)
             for k in range(self.neighbours.first[i], self.neighbours.last[i]):
-                found = self.neighbours.found[k]
-                spheres += found
-                if found > 0:
+                partners = self.neighbours.found[k]
+                spheres += partners
+                if partners > 0:
                     count += 1
                     wanted[0] += ti.cast(self.neighbours.slot[k] < 0, ti.i32)
-                    wanted[1] += found * self.neighbours.is_new[k]
+                    wanted[1] += partners * self.neighbours.is_new[k]
                 elif self._leaves(k):
                     wanted[2] += 1
                 elif self.neighbours.slot[k] >= 0:
@@ -300,12 +300,12 @@ class NearPairs:
 
     @ti.func
     def _row_sums(self, i):
-        found = ti.Vector.zero(ti.i32, 5)
+        sums = ti.Vector.zero(ti.i32, 5)
         if self.contacts.free[i] == 1:
             wanted = self.wanted[i]
-            found[0], found[1] = self.row_count[i], self.row_spheres[i]
-            found[2], found[3], found[4] = wanted[0], wanted[1], wanted[2]
-        return found
+            sums[0], sums[1] = self.row_count[i], self.row_spheres[i]
+            sums[2], sums[3], sums[4] = wanted[0], wanted[1], wanted[2]
+        return sums
 
     @ti.func
     def _begin_row(self, i, before, value):
@@ -356,15 +356,15 @@ class NearPairs:
         start, count, wanted = self.neighbours.first[i], 0, self.wanted[i]
         fresh, place = wanted[0], self.store.sphere_end[None] + wanted[1]
         for k in range(start, self.neighbours.last[i]):
-            p, found = self.neighbours.slot[k], self.neighbours.found[k]
-            if p < 0 and found > 0:
+            p, partners = self.neighbours.slot[k], self.neighbours.found[k]
+            if p < 0 and partners > 0:
                 p = self.store.allocate(fresh, self.total[None][2], i, self.neighbours.body[k])
                 self.neighbours.slot[k] = p
                 fresh += 1
             if p >= 0:
-                if found > 0 and self.neighbours.is_new[k] == 1:
+                if partners > 0 and self.neighbours.is_new[k] == 1:
                     self.store.reserve_spheres(p, place)
-                    place += found
+                    place += partners
                 self.row[start + count] = p
                 count += 1
 

@@ -211,9 +211,7 @@ def levers(arms: np.ndarray) -> np.ndarray:
     return matrices
 
 
-def scaled_eigenvalues(
-    root: np.ndarray, blocks: np.ndarray, multiply: Any = product
-) -> np.ndarray:
+def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray, multiply: Any = product) -> np.ndarray:
     """Largest eigenvalue of root G root^T for every 6x6 block G, shape (n,)."""
     if multiply is not product:
         return np.linalg.eigvalsh(root @ blocks @ transposed(root))[:, -1]

@@ -77,9 +77,9 @@ class Effect:
         """
         if not self.may_be_silent:
             raise InputError(f"effect {self.name} cannot be silent: leave it out of the scene")
-        made = copy.copy(self)
-        vars(made).update(name="", is_silent=True)
-        return made
+        silent = copy.copy(self)
+        vars(silent).update(name="", is_silent=True)
+        return silent
 
     def check_material(self, material: Material) -> None:
         """Refuse a material with which the effect cannot act; a scene calls this."""
@@ -138,14 +138,14 @@ class Effect:
 
 def bound(effect: Effect, tables: Tables) -> Any:
     """A copy of an effect with its own fields, which belongs to an engine and serves its scenes."""
-    made = object.__new__(type(effect))
-    made.__dict__.update(_given=vars(effect), _frozen={}, tables=tables)
-    made._count = _count_of(effect)
-    if made._count:
+    copied = object.__new__(type(effect))
+    copied.__dict__.update(_given=vars(effect), _frozen={}, tables=tables)
+    copied._count = _count_of(effect)
+    if copied._count:
         one_row = effect.role in MANY
-        made.law = ti.field(real, shape=made._count if one_row else (MOST**2, made._count))
-    made.declare(tables.capacity)
-    return made
+        copied.law = ti.field(real, shape=copied._count if one_row else (MOST**2, copied._count))
+    copied.declare(tables.capacity)
+    return copied
 
 
 def _count_of(effect):
@@ -178,15 +178,15 @@ def _checked_numbers(effect, material):
     """Numbers of an effect with a material, as an array; InputError unless all are numbers."""
     given = effect.numbers(material)
     try:
-        found = np.array(given, dtype=np.float64)
+        numbers = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
-        found = np.array(np.nan)
-    if found.shape != (effect._count,) or np.isnan(found).any():
+        numbers = np.array(np.nan)
+    if numbers.shape != (effect._count,) or np.isnan(numbers).any():
         raise InputError(
             f"numbers of effect {effect.name or type(effect).__name__} must be {effect._count} "
             f"real numbers, got {shown(given)}"
         )
-    return found
+    return numbers
 
 
 def check_sliding_energy(effect: Effect, option: str, material: Material) -> None:

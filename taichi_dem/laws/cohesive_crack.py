@@ -187,9 +187,9 @@ def _direction(opening, sliding):
 
 
 @ti.func
-def _traction(way):
+def _traction(direction):
     """Traction over the strength; way: beyond the onset, 1 where one line would end."""
-    return ti.max(0.0, 1.0 - _FIRST * way, _SECOND * (_END - way))
+    return ti.max(0.0, 1.0 - _FIRST * direction, _SECOND * (_END - direction))
 
 
 @ti.func

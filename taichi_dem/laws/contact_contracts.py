@@ -240,7 +240,7 @@ class ContactLaw(Effect):
     def _in_deep_contact(self, find, mesh, materials):
         """Largest value of each body, by the numbers of its contacts and a deep overlap."""
         deep = DEEP * np.cbrt(volumes(mesh))
-        return materials.largest(lambda one: find(self.numbers(one), deep))
+        return materials.largest(lambda material: find(self.numbers(material), deep))
 
 
 @ti.data_oriented
@@ -264,11 +264,11 @@ class FrictionLaw(Effect):
         """Force [N] on the second body against its sliding velocity [m/s], without springs."""
 
     @ti.func
-    def follow(self, k, normal, way):
+    def follow(self, k, normal, slip):
         """Turn the spring of entry k into the plane of contact and stretch it by ``way`` [m]."""
 
     @ti.func
-    def slip(self, m, k, limit, way):
+    def slip(self, m, k, limit, moved):
         """Shorten the spring of entry k to a limit [N]; return the energy dissipated [J]."""
         return 0.0
 

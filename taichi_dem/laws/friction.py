@@ -84,22 +84,22 @@ class StickingFriction(Friction):
     @ti.func
     def stiffness(self, m, k):
         """Stiffness of the spring of pair k [N/m]; of bodies for as much area as may touch."""
-        found, contact, entry = self.law[m, 1], self.tables.contact, self.entry[k]
+        stiffness, contact, entry = self.law[m, 1], self.tables.contact, self.entry[k]
         if ti.static(not self.tables.geometry.by_face):
             area = self.tables.geometry.largest_area(entry[0], entry[1])
-            found = self.law[m, 2] * contact.stiffness_at(contact.row(m), 0.0) * area
-        return found
+            stiffness = self.law[m, 2] * contact.stiffness_at(contact.row(m), 0.0) * area
+        return stiffness
 
     @ti.func
-    def follow(self, k, normal, way):
+    def follow(self, k, normal, slip):
         """Turn the spring of sphere pair k into the contact's plane, stretch it by ``way`` [m]."""
         stretch = self.stretch[k]
         flat = stretch - dot(stretch, normal) * normal
         # Turned, not projected: to turn with the contact takes no energy.
-        self.stretch[k] = flat * (norm(stretch) / ti.max(norm(flat), 1e-300)) + way
+        self.stretch[k] = flat * (norm(stretch) / ti.max(norm(flat), 1e-300)) + slip
 
     @ti.func
-    def slip(self, m, k, limit, way):
+    def slip(self, m, k, limit, moved):
         """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J]."""
         # Work of the stretch at the mean force = energy stored + energy dissipated by slipping.
         trial = self.stretch[k]
@@ -110,7 +110,7 @@ class StickingFriction(Friction):
         if size > longest:
             present = trial * (longest / size)
         self.stretch[k] = present
-        return 0.5 * stiffness * dot(trial - way + present, trial - present)
+        return 0.5 * stiffness * dot(trial - moved + present, trial - present)
 
     @ti.func
     def spring(self, m, k):

@@ -57,7 +57,7 @@ def check_activation(effect: Any) -> None:
             "effects 'auto' must have laws of bonds that act, as it checks the limits of these "
             f"laws only, got a silent {type(effect).name}: list the effects, or take 'all'"
         )
-    said, *changed = (_first(type(effect), one) for one in ("begins", "traction", "failed"))
+    said, *changed = (_first(type(effect), method) for method in ("begins", "traction", "failed"))
     if said > min(changed):
         raise InputError(
             "effects 'auto' must have laws of bonds that say when they begin to act: "
@@ -113,9 +113,9 @@ class ChosenEffects(tuple):
 
     def __new__(cls, effects: Iterable[Effect], word: str = LISTED) -> "ChosenEffects":
         """Keep the word with the effects."""
-        made = super().__new__(cls, effects)
-        made.word = word
-        return made
+        chosen = super().__new__(cls, effects)
+        chosen.word = word
+        return chosen
 
 
 def chosen_effects(

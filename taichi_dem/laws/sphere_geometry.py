@@ -127,6 +127,9 @@ class SphereGeometry(Geometry):
     @ti.func
     def gap(self, a, b, first, turned_first, second, turned_second):
         """Gap of two spheres [m]."""
-        one, other = self.sphere[a], self.sphere[b]
-        on_first, on_second = matvec(turned_first, one.xyz), matvec(turned_second, other.xyz)
-        return norm(second + on_second - first - on_first) - one[3] - other[3]
+        sphere, other_sphere = self.sphere[a], self.sphere[b]
+        on_first, on_second = (
+            matvec(turned_first, sphere.xyz),
+            matvec(turned_second, other_sphere.xyz),
+        )
+        return norm(second + on_second - first - on_first) - sphere[3] - other_sphere[3]

@@ -67,7 +67,7 @@ class Hole:
 
 def read_holes(path: FileName) -> tuple[Hole, ...]:
     """Read holes from a CSV file with a row each and the fields of ``Hole`` as columns."""
-    known, rows = [one.name for one in fields(Hole)], checked_rows(path)
+    known, rows = [column.name for column in fields(Hole)], checked_rows(path)
     if not {*known[:3]} <= {*rows[0]} <= {*known}:
         raise InputError(
             f"columns of a table of holes must be {', '.join(known)} (the first three always), "
@@ -89,16 +89,16 @@ def check_holes(size: Sequence[float], holes: Sequence[Hole]) -> None:
         for place in (hole.at(size[2], 0.0), hole.at(size[2], hole.length_m)):
             room = np.minimum(place, np.array(size) - place)[: 3 if place[2] < size[2] else 2]
             if room.min() <= 0.5 * hole.diameter_m:
-                box, got = (", ".join(f"{x:.4g}" for x in one) for one in (size, place))
+                box, got = (", ".join(f"{x:.4g}" for x in first) for first in (size, place))
                 raise InputError(
                     f"hole {number} must lie inside the rock of ({box}) m, got ({got})"
                 )
-    for (a, one), (b, other) in combinations(enumerate(holes, 1), 2):
-        gap = _least_distance(size[2], one, other) - 0.5 * (one.diameter_m + other.diameter_m)
+    for (a, first), (b, second) in combinations(enumerate(holes, 1), 2):
+        gap = _least_distance(size[2], first, second) - 0.5 * (first.diameter_m + second.diameter_m)
         if gap <= 0.0:
             raise InputError(
                 f"holes {a} and {b} must not cross, got walls that are {gap:.3g} m apart, from "
-                f"({one.x_m:g}, {one.y_m:g}) and ({other.x_m:g}, {other.y_m:g}) m on the face"
+                f"({first.x_m:g}, {first.y_m:g}) and ({second.x_m:g}, {second.y_m:g}) m on the face"
             )
 
 
@@ -155,12 +155,12 @@ def _prism(occ, depth, hole, turn):
     count = _PRISM if hole.diameter_m <= _WIDE else 2 * _PRISM
     angle = 2.0 * np.pi / count
     radius = 0.5 * hole.diameter_m * np.sqrt(angle / np.sin(angle))
-    way, up = hole.direction, np.array([0.0, 1.0, 0.0])
-    across, outside = np.cross(up, -way), hole.diameter_m / np.tan(np.radians(_FLATTEST))
+    along, up = hole.direction, np.array([0.0, 1.0, 0.0])
+    across, outside = np.cross(up, -along), hole.diameter_m / np.tan(np.radians(_FLATTEST))
     begin = hole.at(depth, -outside)
     around = angle * (np.arange(count) + turn)
     ring = begin + radius * (np.outer(np.cos(around), across) + np.outer(np.sin(around), up))
-    return prism(occ, ring, (outside + hole.length_m) * way)
+    return prism(occ, ring, (outside + hole.length_m) * along)
 
 
 def _set_sizes(model, size, near, far):
@@ -188,11 +188,11 @@ def with_charges(mesh: Mesh, depth: float, holes: Sequence[Hole]) -> tuple[Mesh,
             stages.setdefault((hole.delay_s, hole.diameter_m), []).append((number, hole))
     if not stages:
         raise InputError("a table of holes must have one that is charged, got none")
-    outer, groups, found = geometry.outer_faces(mesh.tetrahedra), dict(mesh.groups), {}
+    outer, groups, charges = geometry.outer_faces(mesh.tetrahedra), dict(mesh.groups), {}
     for k, key in enumerate(sorted(stages), 1):
-        walls = [_wall(mesh.points, outer, depth, *one) for one in stages[key]]
-        groups[f"stage_{k}"], found[f"stage_{k}"] = np.vstack(walls), stages[key][0][1]
-    return replace(mesh, groups=groups), found
+        walls = [_wall(mesh.points, outer, depth, *stage) for stage in stages[key]]
+        groups[f"stage_{k}"], charges[f"stage_{k}"] = np.vstack(walls), stages[key][0][1]
+    return replace(mesh, groups=groups), charges
 
 
 def _wall(points, outer, depth, number, hole):

@@ -55,9 +55,9 @@ def bodies_in(raw: Any, points: np.ndarray) -> Bodies:
     """Tetrahedra of a file, those that other cells are cut into last and of positive volume."""
     solids = blocks_of(raw, 3)
     solids.sort(key=lambda numbered: shape_of(numbered[1].type) != "tetra")
-    found, owners = zip(*(_cut(block, points) for _, block in solids))
+    bodies, owners = zip(*(_cut(block, points) for _, block in solids))
     blocks = np.repeat([k for k, _ in solids], list(map(len, owners)))
-    return Bodies(np.vstack(found), blocks, np.concatenate(owners))
+    return Bodies(np.vstack(bodies), blocks, np.concatenate(owners))
 
 
 def corners_of(block: Any, point_count: int) -> np.ndarray:
@@ -92,7 +92,7 @@ def _cut(block, points):
 def _cones(block, corners):
     """Cones from the lowest corner of each cell to the faces that it is no part of."""
     shape, lowest = shape_of(block.type), corners.argmin(axis=1)
-    found, owners = [np.empty((0, 4), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    cones, owners = [np.empty((0, 4), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for apex in range(_CORNERS[shape]):
         numbers = np.flatnonzero(lowest == apex)
         here = corners[numbers]
@@ -100,9 +100,9 @@ def _cones(block, corners):
             if apex not in face and len(here):
                 base = triangles_in(here[:, face])
                 each = len(base) // len(here)
-                found.append(np.column_stack([np.repeat(here[:, apex], each), base]))
+                cones.append(np.column_stack([np.repeat(here[:, apex], each), base]))
                 owners.append(np.repeat(numbers, each))
-    tetrahedra, owner = np.vstack(found), np.concatenate(owners)
+    tetrahedra, owner = np.vstack(cones), np.concatenate(owners)
     ends = tetrahedra[:, LOCAL_EDGES]
     whole = (ends[..., 0] != ends[..., 1]).all(axis=1)
     return tetrahedra[whole], owner[whole]
@@ -150,7 +150,7 @@ def unread_groups(raw: Any, mesh: Mesh) -> tuple[str, ...]:
     named = [key.name for key in raw.field_data]
     named += [key for key in raw.cell_sets if key not in raw.field_data]
     known = {*mesh.groups, *mesh.body_groups, "gmsh:bounding_entities"}
-    unread = (one for one in (*named, *raw.point_sets) if known.isdisjoint(one.split(_BOTH)))
+    unread = (group for group in (*named, *raw.point_sets) if known.isdisjoint(group.split(_BOTH)))
     return tuple(dict.fromkeys(unread))
 
 
@@ -160,8 +160,8 @@ def _groups_in(raw, dimension):
     # A solid is in each of the groups that ``write_mesh`` has joined.
     several = dimension == 3 and "gmsh:physical" in raw.cell_data
     for name, k, chosen in _marked(raw, dimension):
-        for one in name.split(_BOTH) if several else [name]:
-            members = groups.setdefault(one, {})
+        for group in name.split(_BOTH) if several else [name]:
+            members = groups.setdefault(group, {})
             members[k] = chosen | members.get(k, False)
     return groups
 

@@ -46,34 +46,29 @@ def checked_arrays(
 
 def checked_points(points: Any) -> np.ndarray:
     """Copy as (n, 3) float64, or InputError."""
-    found = _rows("points", points, 3, "iuf", "numbers")
+    checked = _rows("points", points, 3, "iuf", "numbers")
     with np.errstate(over="ignore"):
-        found = found.astype(np.float64)
-    bad = found[~(np.abs(found) <= _FARTHEST).all(axis=1)]
+        checked = checked.astype(np.float64)
+    bad = checked[~(np.abs(checked) <= _FARTHEST).all(axis=1)]
     if len(bad):
         raise InputError(
             f"points must be finite, within {_FARTHEST:g} m, but {len(bad)} are not, the first is "
             f"{bad[0].tolist()}"
         )
-    return found
+    return checked
 
 
 def _rows(what, values, width, kinds, words):
     try:
-        found = np.asarray(values)
+        rows = np.asarray(values)
     except ValueError:
         raise InputError(f"{what} must be rows of {width} {words} each") from None
-    if (
-        found.ndim != 2
-        or found.shape[1] != width
-        or not len(found)
-        or found.dtype.kind not in kinds
-    ):
+    if rows.ndim != 2 or rows.shape[1] != width or not len(rows) or rows.dtype.kind not in kinds:
         raise InputError(
             f"{what} must be rows of {width} {words} each, at least one, got an array of "
-            f"{found.dtype} of shape {found.shape}"
+            f"{rows.dtype} of shape {rows.shape}"
         )
-    return found
+    return rows
 
 
 def weld_labels(
@@ -120,13 +115,13 @@ def _by_name(what, groups, members):
 
 def _checked_bodies(name, bodies, body_count):
     try:
-        found = np.asarray(bodies)
+        checked = np.asarray(bodies)
     except ValueError:
-        found = np.zeros(0)
-    if found.ndim != 1 or not found.size or found.dtype.kind not in "iu":
+        checked = np.zeros(0)
+    if checked.ndim != 1 or not checked.size or checked.dtype.kind not in "iu":
         raise InputError(f"body group {name!r} must be a list of body numbers, got {shown(bodies)}")
-    refuse_outside(f"body group {name!r}", "body", found[:, None], body_count)
-    return np.unique(found).astype(np.int32)
+    refuse_outside(f"body group {name!r}", "body", checked[:, None], body_count)
+    return np.unique(checked).astype(np.int32)
 
 
 def refuse_outside(what: str, of: str, rows: np.ndarray, count: int) -> None:
@@ -141,9 +136,9 @@ def refuse_outside(what: str, of: str, rows: np.ndarray, count: int) -> None:
 
 def _checked_indices(what, indices, width, point_count):
     """Copy as (n, width) int32 with all values in range, or InputError."""
-    found = _rows(what, indices, width, "iu", "integer point numbers")
-    refuse_outside(what, "point", found, point_count)
-    return found.astype(np.int32)
+    checked = _rows(what, indices, width, "iu", "integer point numbers")
+    refuse_outside(what, "point", checked, point_count)
+    return checked.astype(np.int32)
 
 
 def _without_loose_points(points, tetrahedra, groups, notes):

@@ -94,13 +94,15 @@ def read_mesh(
     unread = cells.unread_groups(raw, mesh)
     words = "are not read, as they hold no triangles or solid cells"
     notes = [f"the groups {', '.join(unread)} {words}"] if unread else []
-    told = [_of_dropped_cells(printed), unbonded_places(mesh.tetrahedra)]
+    sentences = [_of_dropped_cells(printed), unbonded_places(mesh.tetrahedra)]
     # A set of all points is a program's own, one of some was meant for something.
-    told += notes if any(len(some) < len(raw.points) for some in raw.point_sets.values()) else []
-    told = [sentence for sentence in told if sentence]
-    for sentence in told:
+    sentences += (
+        notes if any(len(some) < len(raw.points) for some in raw.point_sets.values()) else []
+    )
+    sentences = [sentence for sentence in sentences if sentence]
+    for sentence in sentences:
         warnings.warn(f"mesh file {path}: {sentence}", stacklevel=2)
-    notes = [*dict.fromkeys((*notes, *told)), *mesh.notes]
+    notes = [*dict.fromkeys((*notes, *sentences)), *mesh.notes]
     return replace(mesh, notes=tuple(notes), source=path)
 
 

@@ -70,12 +70,12 @@ def session(name: str) -> Iterator[Any]:
             gmsh.finalize()
 
 
-def prism(occ: Any, ring: Any, way: Any) -> tuple[int, int]:
+def prism(occ: Any, ring: Any, direction: Any) -> tuple[int, int]:
     """The volume, as (3, tag), of a polygon (n, 3) that is drawn out along a way (3,)."""
     points = [occ.addPoint(*place) for place in ring]
     lines = [occ.addLine(*pair) for pair in zip(points, points[1:] + points[:1])]
     base = occ.addPlaneSurface([occ.addCurveLoop(lines)])
-    return next(one for one in occ.extrude([(2, base)], *way) if one[0] == 3)
+    return next(entity for entity in occ.extrude([(2, base)], *direction) if entity[0] == 3)
 
 
 def filled_surface(path: FileName, element: float, scale: float = 1.0) -> Mesh:

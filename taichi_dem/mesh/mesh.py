@@ -89,8 +89,8 @@ class Mesh(Pictured):
             notes.append(f"the mesh has {parts} parts that share no face with each other")
         bodies = checked_body_groups(self.body_groups, len(arrays[1]))
         names = "points", "tetrahedra", "groups", "inner_groups", "body_groups", "notes"
-        found = zip(names, (*arrays, bodies, tuple(dict.fromkeys(notes))))
-        self.__dict__.update(found)
+        checked = zip(names, (*arrays, bodies, tuple(dict.fromkeys(notes))))
+        self.__dict__.update(checked)
         for array in (*arrays[:2], *self.groups.values(), *bodies.values()):
             array.setflags(write=False)
 
@@ -159,9 +159,9 @@ class Mesh(Pictured):
                     f"group {name} must have inner faces, which two bodies share, to be unbonded "
                     "or weaker, got outer faces"
                 )
-        made = copy.copy(self)
-        made.__dict__["bonded_shares"] = tuple(sorted(shares.items()))
-        return made
+        bonded = copy.copy(self)
+        bonded.__dict__["bonded_shares"] = tuple(sorted(shares.items()))
+        return bonded
 
     @property
     def has_open_faces(self) -> bool:
@@ -274,10 +274,10 @@ def checked_mesh(
     >>> checked_mesh(corners, [[0, 1, 2, 3]], {"base": [[0, 1, 2]]}).body_count
     1
     """
-    made: Any = Mesh
+    mesh: Any = Mesh
     options = {"weld_tolerance": weld_tolerance, "keep_coincident": keep_coincident}
     bodies = {} if body_groups is None else body_groups
-    return made(points, tetrahedra, groups, body_groups=bodies, **options)
+    return mesh(points, tetrahedra, groups, body_groups=bodies, **options)
 
 
 def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
@@ -319,8 +319,8 @@ def _rotation(turned):
     axis, radians = np.array(turned) / angle, np.radians(angle % 360.0)
     cross = np.cross(np.eye(3), axis)
     cos, sin = np.cos(radians), np.sin(radians)
-    made = cos * np.eye(3) + sin * cross + (1.0 - cos) * axis[:, None] * axis[None, :]
-    return np.round(made, _DIGITS)
+    matrix = cos * np.eye(3) + sin * cross + (1.0 - cos) * axis[:, None] * axis[None, :]
+    return np.round(matrix, _DIGITS)
 
 
 def _choose(mesh: Mesh, corners: np.ndarray, chosen: Choice, what: str = "faces") -> np.ndarray:
@@ -328,13 +328,13 @@ def _choose(mesh: Mesh, corners: np.ndarray, chosen: Choice, what: str = "faces"
     centres = mesh.points[corners].mean(axis=1)
     if not callable(chosen):
         raise InputError(f"chosen must be a function of centres of {what}, got {shown(chosen)}")
-    found = np.asarray(chosen(centres))
-    if found.shape != (len(corners),) or found.dtype != bool:
+    choice = np.asarray(chosen(centres))
+    if choice.shape != (len(corners),) or choice.dtype != bool:
         raise InputError(
             f"chosen must return one truth value for each of {len(corners)} {what}, got an "
-            f"array of {found.dtype} of shape {found.shape}"
+            f"array of {choice.dtype} of shape {choice.shape}"
         )
-    return found
+    return choice
 
 
 def _with_group(mesh: Mesh, kind: str, name: str, members: np.ndarray) -> Mesh:

@@ -43,27 +43,27 @@ class _Solid:
 
     def moved(self, points, shift):
         """Points shifted along their free axes, where that leaves them in the solid."""
-        found = np.clip(points + self.free * shift, self.low, self.high)
-        out = ~self.within(found) & self.free[:, :2].all(axis=1)
-        out[self.sliding] = ~self.on_side(found[self.sliding])
-        found[out] = points[out]
-        return found
+        moved = np.clip(points + self.free * shift, self.low, self.high)
+        out = ~self.within(moved) & self.free[:, :2].all(axis=1)
+        out[self.sliding] = ~self.on_side(moved[self.sliding])
+        moved[out] = points[out]
+        return moved
 
     def filled(self, points):
         """Tetrahedra of Delaunay's rule inside the solid, without flat ones, of positive volume."""
         # Imported here, so that SciPy loads only where a mesh is scattered.
         from scipy.spatial import Delaunay
 
-        found = Delaunay(points).simplices
-        volume = geometry.signed_volumes(points, found)
-        found = np.where((volume < 0.0)[:, None], found[:, [0, 1, 3, 2]], found)
+        tetrahedra = Delaunay(points).simplices
+        volume = geometry.signed_volumes(points, tetrahedra)
+        tetrahedra = np.where((volume < 0.0)[:, None], tetrahedra[:, [0, 1, 3, 2]], tetrahedra)
         solid = np.abs(volume) > _FLAT * self.element**3
-        return found[solid & self.within(points[found].mean(axis=1))]
+        return tetrahedra[solid & self.within(points[tetrahedra].mean(axis=1))]
 
     def is_filled(self, points, tetrahedra):
         """Whether the volume of bodies is that of the solid: no gap, and none outside."""
-        found = geometry.signed_volumes(points, tetrahedra).sum()
-        return abs(found - self.volume) <= _MISSING * self.volume
+        filled = geometry.signed_volumes(points, tetrahedra).sum()
+        return abs(filled - self.volume) <= _MISSING * self.volume
 
 
 def scattered(
@@ -128,15 +128,15 @@ def _mended(solid, points, draw):
         shift = np.zeros(points.shape)
         shift[movers] = _MEND * solid.element * draw.uniform(-1.0, 1.0, (len(movers), 3))
         tried = solid.moved(points, shift)
-        found = solid.filled(tried)
+        cells = solid.filled(tried)
         before = _worst_near(points[movers], points, bodies, solid.element)
-        after = _worst_near(points[movers], tried, found, solid.element)
+        after = _worst_near(points[movers], tried, cells, solid.element)
         back = movers[after <= before]
         if len(back):
             tried[back] = points[back]
-            found = solid.filled(tried)
-        if solid.is_filled(tried, found):
-            points, bodies = tried, found
+            cells = solid.filled(tried)
+        if solid.is_filled(tried, cells):
+            points, bodies = tried, cells
     return points, bodies
 
 
@@ -149,10 +149,10 @@ def _quality(points, tetrahedra):
 def _apart(points, candidates, distance):
     """Those of some numbers of points, the first first, that are a distance apart [m]."""
     chosen: list[int] = []
-    for one in candidates.tolist():
-        away = geometry.length(points[chosen] - points[one])
+    for candidate in candidates.tolist():
+        away = geometry.length(points[chosen] - points[candidate])
         if away.min(initial=np.inf) > distance:
-            chosen.append(one)
+            chosen.append(candidate)
     return np.array(chosen, dtype=int)
 
 

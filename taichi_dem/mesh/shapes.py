@@ -177,8 +177,8 @@ def drawn_out(
         )
         points, tetrahedra = scattered(points, tetrahedra, *tests, element, scatter)
     groups = _groups(points, geometry.outer_faces(tetrahedra), depth, sides)
-    made = checked_mesh(points, tetrahedra, groups)
-    return made if scatter is None else in_space_order(made)
+    solid = checked_mesh(points, tetrahedra, groups)
+    return solid if scatter is None else in_space_order(solid)
 
 
 def _prisms(triangles, rank, layer, count):
@@ -208,9 +208,9 @@ def triangulated(loops: Sequence[np.ndarray], element: float) -> tuple[np.ndarra
     draw = np.random.default_rng(1)
     points = np.vstack([starts, _inner_points(starts, ends, element)])
     for _ in range(_ROUNDS):
-        found = _inner_triangles(points, starts, ends, element, draw)
-        _smooth(points, found, len(starts))
-    return points, found
+        triangles = _inner_triangles(points, starts, ends, element, draw)
+        _smooth(points, triangles, len(starts))
+    return points, triangles
 
 
 def _outline(loops):
@@ -222,10 +222,10 @@ def _inner_triangles(points, starts, ends, element, draw):
     """Triangles that fill the region; InputError where they do not."""
     wanted = 0.5 * float((starts[:, 0] * ends[:, 1] - ends[:, 0] * starts[:, 1]).sum())
     for radius in _RADII:
-        found = _delaunay(points, radius * element, _SHIFT * element, draw)
-        found = found[_is_inside(points[found].mean(axis=1), starts, ends)]
-        if abs(float(_areas(points, found).sum()) - wanted) <= _AREA * wanted:
-            return found
+        triangles = _delaunay(points, radius * element, _SHIFT * element, draw)
+        triangles = triangles[_is_inside(points[triangles].mean(axis=1), starts, ends)]
+        if abs(float(_areas(points, triangles).sum()) - wanted) <= _AREA * wanted:
+            return triangles
     raise InputError(
         f"element must be smaller, to fit into the narrowest place of this shape, got {element:g} m"
     )
@@ -270,12 +270,12 @@ def _delaunay(points, radius, shift, draw):
 
     # Of points on one circle any triangulation is right, and all triangles must choose the same.
     moved = points + shift * draw.uniform(-1.0, 1.0, points.shape)
-    found = np.sort(Triangulation(*moved.T).triangles, axis=1)
-    a, b, c = (moved[found[:, k]] for k in range(3))
+    corners = np.sort(Triangulation(*moved.T).triangles, axis=1)
+    a, b, c = (moved[corners[:, k]] for k in range(3))
     sides = dot(a - b, a - b) * dot(b - c, b - c) * dot(c - a, c - a)
     # The product of the sides is four times the radius times the area.
-    small = sides < (4.0 * radius * _areas(moved, found)) ** 2
-    triangles = np.unique(found[small], axis=0)
+    small = sides < (4.0 * radius * _areas(moved, corners)) ** 2
+    triangles = np.unique(corners[small], axis=0)
     return np.where((_areas(points, triangles) < 0.0)[:, None], triangles[:, ::-1], triangles)
 
 
@@ -364,8 +364,8 @@ def _refuse_clashes(parts):
     """Raise InputError where NAME_GROUP is the name of a group that is there already."""
     for kind, taken in (("groups", ()), ("body_groups", parts)):
         own = [(name, group) for name, mesh in parts.items() for group in getattr(mesh, kind)]
-        made = [f"{name}_{group}" for name, group in own]
-        for name, count in Counter([*made, *{*taken, *(group for _, group in own)}]).items():
+        names = [f"{name}_{group}" for name, group in own]
+        for name, count in Counter([*names, *{*taken, *(group for _, group in own)}]).items():
             if count > 1:
                 raise InputError(
                     "names must give each group a name of its own, but two groups would be "
@@ -385,14 +385,14 @@ def _bonded(mesh):
         inner = np.isin(mine, shared)
         if not inner.all():
             groups[name] = label[own[~inner]]
-    made = checked_mesh(mesh.points, tetrahedra, groups, body_groups=mesh.body_groups)
-    before, after = (len(np.unique(joined_bodies(one.tetrahedra))) for one in (mesh, made))
+    bonded = checked_mesh(mesh.points, tetrahedra, groups, body_groups=mesh.body_groups)
+    before, after = (len(np.unique(joined_bodies(block.tetrahedra))) for block in (mesh, bonded))
     if after == before:
         raise InputError(
             "bonded must be False for meshes that share no face: corners of their faces "
             "must coincide, got none that do"
         )
-    return made
+    return bonded
 
 
 def in_space_order(mesh: Mesh) -> Mesh:

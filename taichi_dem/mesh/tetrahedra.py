@@ -98,11 +98,11 @@ def penetration(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     # Theorem of separating axes: convex bodies are apart along a face normal or across two edges.
     origin = first[:, :1]
     first, second = first - origin, second - origin
-    one, other = (np.diff(c[:, LOCAL_EDGES], axis=2)[:, :, 0] for c in (first, second))
-    normals = [np.cross(edges[:, _FROM], edges[:, _TO]) for edges in (one, other)]
+    a, b = (np.diff(c[:, LOCAL_EDGES], axis=2)[:, :, 0] for c in (first, second))
+    normals = [np.cross(edges[:, _FROM], edges[:, _TO]) for edges in (a, b)]
     least = _overlap(np.concatenate(normals, axis=1), first, second)
     (left,) = np.nonzero(least > 0.0)
-    across = np.cross(one[left, :, None], other[left, None]).reshape(len(left), 36, 3)
+    across = np.cross(a[left, :, None], b[left, None]).reshape(len(left), 36, 3)
     least[left] = np.minimum(least[left], _overlap(across, first[left], second[left]))
     return least
 
@@ -110,8 +110,8 @@ def penetration(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 def _overlap(axes, first, second):
     """Least overlap [m] of the projections of each two bodies on some axes, (n, axes, 3), (n,)."""
     size = np.linalg.norm(axes, axis=2)
-    one, other = (np.einsum("nax,ncx->nac", axes, corners) for corners in (first, second))
-    both = np.minimum(one.max(axis=2) - other.min(axis=2), other.max(axis=2) - one.min(axis=2))
+    a, b = (np.einsum("nax,ncx->nac", axes, corners) for corners in (first, second))
+    both = np.minimum(a.max(axis=2) - b.min(axis=2), b.max(axis=2) - a.min(axis=2))
     # Parallel edges have no axis across both.
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(size > 0.0, both / size, np.inf).min(axis=1, initial=np.inf)
@@ -136,26 +136,26 @@ def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
     """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second."""
     # Close points share a cell of at least one of eight grids of cell size 4 distance, shifted by
     # half a cell along each axis.
-    found = []
+    pairs = []
     cell = 4.0 * distance
     low = points.min(axis=0)
     for shift in np.ndindex(2, 2, 2):
         first, second = _in_one_cell(np.floor((points - low) / cell + 0.5 * np.array(shift)))
         near = length(points[first] - points[second]) <= distance
-        found.append(np.sort(np.column_stack([first[near], second[near]]), axis=1))
-    return np.unique(np.vstack(found), axis=0)
+        pairs.append(np.sort(np.column_stack([first[near], second[near]]), axis=1))
+    return np.unique(np.vstack(pairs), axis=0)
 
 
 def _in_one_cell(rows):
     """Numbers of each two equal rows (n, ...), (2, pairs)."""
     order = np.lexsort(rows.T)
-    rows, found = rows[order], [np.empty((2, 0), dtype=np.int64)]
+    rows, pairs = rows[order], [np.empty((2, 0), dtype=np.int64)]
     for step in range(1, len(rows)):
         same = np.flatnonzero((rows[step:] == rows[:-step]).all(axis=1))
         if len(same) == 0:
             break
-        found.append(np.stack([order[same], order[same + step]]))
-    return np.hstack(found)
+        pairs.append(np.stack([order[same], order[same + step]]))
+    return np.hstack(pairs)
 
 
 @functools.cache

@@ -125,9 +125,9 @@ def _faces_of_group(mesh, topology, name):
     number, wanted = geometry.numbers_in(outer, mesh.group_faces(name))
     place = np.full(max(number.max(), wanted.max()) + 1, -1)
     place[wanted] = np.arange(len(wanted))
-    found = np.flatnonzero(place[number] >= 0)
-    found = found[np.argsort(place[number[found]], kind="stable")]
-    return topology.outer_body[found], topology.outer_face[found]
+    faces = np.flatnonzero(place[number] >= 0)
+    faces = faces[np.argsort(place[number[faces]], kind="stable")]
+    return topology.outer_body[faces], topology.outer_face[faces]
 
 
 def check_free(mesh: Mesh, name: str) -> None:

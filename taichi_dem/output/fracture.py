@@ -198,8 +198,8 @@ def quaternions_of(rotation: np.ndarray) -> np.ndarray:
         ]
     )
     best = np.einsum("kkn->kn", candidates).argmax(axis=0)
-    found = candidates[best, :, np.arange(len(best))]
-    return np.roll(found / np.linalg.norm(found, axis=1)[:, None], -1, axis=1)
+    quaternions = candidates[best, :, np.arange(len(best))]
+    return np.roll(quaternions / np.linalg.norm(quaternions, axis=1)[:, None], -1, axis=1)
 
 
 def body_values(result: Any, frame: Frame, colour: str) -> np.ndarray:

@@ -44,8 +44,8 @@ class HoleMonitor:
         self.first = model.centre[self.bodies]
         away = self._in_plane(self.first - self.axis_point)
         # A body in the middle of what is loaded, where that is no hole, has no way outward.
-        way = length(away)[:, None]
-        self.outward = np.divide(away, way, out=np.zeros_like(away), where=way > 0.0)
+        distance = length(away)[:, None]
+        self.outward = np.divide(away, distance, out=np.zeros_like(away), where=distance > 0.0)
         self.monitored = self._nearest_to_free_face(model, body, face)
 
     def _in_plane(self, vectors):

@@ -132,8 +132,8 @@ class Recorder:
         for group, hole in self.holes.items():
             name, body = ("hole", "") if len(self.holes) == 1 else (group, f"{group}_")
             row[f"{name}_radial_displacement_mm"] = 1e3 * hole.radial_displacement(position)
-            way = hole.monitored_displacement(position)
-            row[f"{body}monitor_displacement_mm"] = 1e3 * way
+            displacement = hole.monitored_displacement(position)
+            row[f"{body}monitor_displacement_mm"] = 1e3 * displacement
         row["broken_faces"] = int(sim.state.broken().sum())
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
         if self.model.has_contact and self.model.contact.has_memory:
@@ -337,7 +337,7 @@ def write_paraview(
     largest_stress_Pa, the largest principal one; with several materials also material.
     """
     instance("model", model, Model)
-    frames = several("frames", frames, lambda what, one: instance(what, one, Frame))
+    frames = several("frames", frames, lambda what, given: instance(what, given, Frame))
     instance("acting_since", acting_since, (Mapping, type(None)))
     flag("single", single)
     folder = output_folder(folder)

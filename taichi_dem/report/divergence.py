@@ -147,9 +147,9 @@ class DivergenceCheck:
         words, advice = f"body {body} {what}; {step}, {remedy[0]}", remedy[1]
         above = self._above_limit() if values(self.run.state.tick) else None
         if above:
-            found, (shorter, advised) = above
+            limit, (shorter, advised) = above
             more = "" if "step" in advice else f"; {step}, {remedy[0]}"
-            words, advice = f"{found}{shorter}; body {body} {what}{more}", {**advice, **advised}
+            words, advice = f"{limit}{shorter}; body {body} {what}{more}", {**advice, **advised}
         error = SimulationDiverged(f"diverged at t = {schedule.time_s:.6g} s: {words}")
         error.advice = advice
         return error
@@ -215,13 +215,13 @@ class DivergenceCheck:
         """Largest stable explicit steps [s] by criterion, arrays (body_count,)."""
         marks = values(self.run.state.active_effects, slice(self.run.model.body_count))
         touched = marks & np.int64(CONTACT) > 0
-        found = {}
+        limits = {}
         for name, own in limits_of(self.run).items():
             link, part = name.split("_")
             if part == "stiffness" or way_of(self.run) == "full":
                 acts = touched | (link == "bond")
-                found[f"{link} {_PARTS[part]}"] = np.where(acts, own, np.inf)
-        return found
+                limits[f"{link} {_PARTS[part]}"] = np.where(acts, own, np.inf)
+        return limits
 
 
 def _to_try(why, name, value, unit):

@@ -123,13 +123,13 @@ class _Uses:
 
     def _demanded(self, effect, events):
         """When and where an effect that acted on demand began, and its evaluations."""
-        found, times = {}, self.since.get(effect.reported.since, np.zeros(0))
+        row, times = {}, self.since.get(effect.reported.since, np.zeros(0))
         if events and np.isfinite(times).any():
             first = int(np.nanargmin(times))
-            found = {"since_s": float(times[first]), "where": f"body {first}"}
+            row = {"since_s": float(times[first]), "where": f"body {first}"}
         if isinstance(effect, UnitLaw):
-            found.update(evaluations=self.evaluated, skipped=self.skipped)
-        return found
+            row.update(evaluations=self.evaluated, skipped=self.skipped)
+        return row
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

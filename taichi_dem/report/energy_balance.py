@@ -156,7 +156,7 @@ class EnergyBalance(Kept):
         """Size of the momentum of bodies, or of their load impulse if larger [N s], summed."""
         rows = self.run.readings.momentum()
         sizes = (np.linalg.norm(rows[:, k : k + 3], axis=1) for k in (0, 6))
-        return np.max([total(one) for one in (*sizes, _LEAST_SHARE * rows[:, 12])], axis=0)
+        return np.max([total(column) for column in (*sizes, _LEAST_SHARE * rows[:, 12])], axis=0)
 
 
 def _own(rows):

@@ -70,10 +70,12 @@ class PartScales:
     def of_materials(self, name: str, choose: Any) -> np.ndarray:
         """A constant of each part: the least or largest of its bodies, as ``choose`` says."""
         materials = self.model.materials
-        values = np.array([getattr(one, name) for one in materials.materials], dtype=np.float64)
-        found = values[materials.of_body[self.first]]
-        choose.at(found, self.part, values[materials.of_body])
-        return found
+        values = np.array(
+            [getattr(material, name) for material in materials.materials], dtype=np.float64
+        )
+        own = values[materials.of_body[self.first]]
+        choose.at(own, self.part, values[materials.of_body])
+        return own
 
     def under(self, effects: Iterable[Any]) -> np.ndarray:
         """Whether any of some effects acts on each part."""
@@ -89,8 +91,8 @@ class PartScales:
         for effect in (*self.model.loads, *self.model.supports):
             acts = parts_under(self.model.mesh, effect, self.part) | everywhere
             for p in np.flatnonzero(acts):
-                own = [one for one, here in zip(materials, present[p]) if here]
-                total[p] += max(effect.stress(one, float(size[p])) for one in own)
+                own = [material for material, here in zip(materials, present[p]) if here]
+                total[p] += max(effect.stress(material, float(size[p])) for material in own)
         return total
 
     def bent(self, until: float, borne: np.ndarray) -> np.ndarray:
@@ -163,7 +165,9 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
         whole = np.full(scales.count, float(np.ptp(model.mesh.points, axis=0).max()))
         own = scales.stress(whole, True)
         shared = _speeds(model, velocity, np.zeros_like(part))
-        beside, rim = (np.maximum(one, other).max() for one, other in zip((beside, rim), shared))
+        beside, rim = (
+            np.maximum(inner, outer).max() for inner, outer in zip((beside, rim), shared)
+        )
     stress = own + scales.density * (scales.wave * beside + rim**2)
     softening = stress / scales.of_materials("tensile_strength", np.minimum)
     shear = stress / np.maximum(scales.of_materials("cohesion", np.minimum), 1e-300)
@@ -192,9 +196,9 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
 
 def _speeds(model, velocity, group):
     """Speeds of groups of bodies at the start: beside a rigid motion, of its rim, and largest."""
-    found = np.zeros((3, int(group.max()) + 1))
+    speeds = np.zeros((3, int(group.max()) + 1))
     if velocity is None:
-        return found
+        return speeds
     mass = model.body_mass[:, None]
     mean = centres(group, model.body_mass, velocity)[group]
     arm = model.centre - centres(group, model.body_mass, model.centre)[group]
@@ -203,18 +207,18 @@ def _speeds(model, velocity, group):
     inertia = np.eye(3) * np.trace(second, axis1=1, axis2=2)[:, None, None] - second
     rate = np.einsum("pij,pj->pi", np.linalg.pinv(inertia, hermitian=True), momentum)
     rim = np.cross(rate[group], arm)
-    for row, one in zip(found, (velocity - mean - rim, rim, velocity)):
-        np.maximum.at(row, group, np.linalg.norm(one, axis=1))
+    for row, each in zip(speeds, (velocity - mean - rim, rim, velocity)):
+        np.maximum.at(row, group, np.linalg.norm(each, axis=1))
     # Rounding of a rigid motion strains nothing.
-    found[0][found[0] <= 1e-9 * found[2]] = 0.0
-    return found
+    speeds[0][speeds[0] <= 1e-9 * speeds[2]] = 0.0
+    return speeds
 
 
 def not_served(
     run: Run, scales: PartScales, energy: np.ndarray, way: np.ndarray
 ) -> tuple[Estimate, ...]:
     """Estimates of what no law serves, from the ways [m] and energies [J] of bodies and parts."""
-    model, found, until = run.model, [], run.schedule.time_s
+    model, lacking, until = run.model, [], run.schedule.time_s
     speed = np.linalg.norm(run.readings.motion()[:, :3], axis=1)
     if not any(isinstance(effect, Gravity) for effect in model.loads):
         active = values(run.state.active_effects, slice(model.body_count))
@@ -226,9 +230,9 @@ def not_served(
         # What is borne and not moved at all does not fall.
         share = np.where(borne & (energy == 0.0), 0.0, share)
         groups = (share, _SHARE), (scales.bent(until, borne), _BENDS)
-        found.append(scales.worst("gravity", *groups))
+        lacking.append(scales.worst("gravity", *groups))
     drag = 0.5 * _AIR * math.pi * model.body_radius**2 * speed**2
-    return (*found, scales.worst("air drag", (_share(scales.sum(drag * way), energy), _SHARE)))
+    return (*lacking, scales.worst("air drag", (_share(scales.sum(drag * way), energy), _SHARE)))
 
 
 def _share(work, energy):

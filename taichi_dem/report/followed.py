@@ -75,7 +75,7 @@ class Followed:
         unconverged, worst = self.step_resolution.unconverged
         missing = () if brief else self.missing_effects.findings(shared_volume)
         slip = self.step_resolution.bond_slip()
-        slipped = (one for one in slip if one.count)
+        slipped = (sliding for sliding in slip if sliding.count)
         unresolved = self._unresolved(scene, method, shared_volume, account)
         report = Report(
             method=method.name,
@@ -109,8 +109,8 @@ class Followed:
         if not scene.on_demand:
             return table
         place = values(run.state.position, slice(run.model.body_count))
-        way = np.linalg.norm(place - self.first, axis=1)
-        return certificate_of(run, balance, table, way)
+        distance = np.linalg.norm(place - self.first, axis=1)
+        return certificate_of(run, balance, table, distance)
 
     def _unresolved(self, scene, method, shared_volume, account):
         return (

@@ -18,7 +18,10 @@ def force_names(model: Model) -> list[str]:
     """Name of the force of each load, each ground and each support, in this order."""
     named = list(zip(names_of(model.effects), model.effects))
     return [
-        f"{column_of(name)}_force" for role in _ROLES for name, one in named if one.role == role
+        f"{column_of(name)}_force"
+        for role in _ROLES
+        for name, effect in named
+        if effect.role == role
     ]
 
 

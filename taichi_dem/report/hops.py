@@ -42,7 +42,7 @@ class Hops(Kept):
         if not self.follows:
             return
         bodies, count = self.run.contacts.store.near_table()[0], self.run.model.body_count
-        found = self.run.readings.contacts_now()
+        contacts = self.run.readings.contacts_now()
         place = values(self.run.state.position, slice(count))
         offset = place[bodies[:, 1]] - place[bodies[:, 0]]
         here = np.column_stack([np.full(len(bodies), time_s), offset])
@@ -50,11 +50,11 @@ class Hops(Kept):
         table = np.zeros((len(here), _COLUMNS))
         _, now, then = np.intersect1d(code, self.code, assume_unique=True, return_indices=True)
         table[now] = self.table[then]
-        touches = (found["on_second"][:, :3] != 0.0).any(axis=1)
+        touches = (contacts["on_second"][:, :3] != 0.0).any(axis=1)
         begins = touches & (table[:, _NOW] == 0.0)
         table[:, _NOW], table[:, _COUNT] = touches, table[:, _COUNT] + begins
-        table[:, _RUB] += found["rub"]
-        table[:, _BOUND] += found["bound"]
+        table[:, _RUB] += contacts["rub"]
+        table[:, _BOUND] += contacts["bound"]
         self._compare(bodies, table, here, begins)
         self.code, self.table = code, table
 
@@ -91,11 +91,11 @@ class Hops(Kept):
 def _slides_on(table, here, softest):
     """Whether pairs have slid on since their marks as they did before, (n,) truth values."""
     before, after = table[:, _MARK] - table[:, _FIRST], here - table[:, _MARK]
-    way, ahead = (np.linalg.norm(each[:, 1:], axis=1) for each in (before, after))
+    travelled, ahead = (np.linalg.norm(each[:, 1:], axis=1) for each in (before, after))
     # Speeds times the product of both times.
-    earlier, later = way * after[:, 0], ahead * before[:, 0]
+    earlier, later = travelled * after[:, 0], ahead * before[:, 0]
     steady = (_ALIKE * later > earlier) & (later < _ALIKE * earlier)
-    aligned = (before[:, 1:] * after[:, 1:]).sum(axis=1) > _ALIGNED * way * ahead
+    aligned = (before[:, 1:] * after[:, 1:]).sum(axis=1) > _ALIGNED * travelled * ahead
     held = table[:, _RUB] < _SLIDES * table[:, _BOUND]
     # Not more often does a pair begin to touch than it is found touching.
     far = ahead * softest * table[:, _COUNT] > _FAR * table[:, _BOUND]

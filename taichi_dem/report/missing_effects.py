@@ -159,7 +159,7 @@ class MissingEffects(Kept):
 
     def findings(self, volume: SharedVolume) -> tuple[MissingEffect, ...]:
         """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none."""
-        found, schedule, model = self.found.copy(), self.run.schedule, self.run.model
+        findings, schedule, model = self.found.copy(), self.run.schedule, self.run.model
         ticks = values(self.run.state.passed, slice(model.bond_count))
         looks = {
             "bodies": (self._within(volume), schedule.time_s),
@@ -168,8 +168,8 @@ class MissingEffects(Kept):
             "dashpot": (np.flatnonzero(self.strain > bond_rounding(self.run)), self.last_s),
         }
         for name in looks.keys() & self.needs.keys():
-            self._see(found, name, *looks[name])
-        rows = zip(self.needs.values(), found.tolist())
+            self._see(findings, name, *looks[name])
+        rows = zip(self.needs.values(), findings.tolist())
         return tuple(placed(need, model, *row) for need, row in rows if row[0])
 
 

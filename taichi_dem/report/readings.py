@@ -156,39 +156,39 @@ class Readings:
         ti.loop_config(serialize=ti.static(self.small))
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
-            found, half, at = self.step.forces_now(p), self.half_step.pair_step(p), self.of_pair
+            forces, half, at = self.step.forces_now(p), self.half_step.pair_step(p), self.of_pair
             for k in ti.static(range(3)):
-                table[a, at.on_first + k] = -half * found.force[k]
-                table[a, at.on_first + 3 + k] = half * found.moment_i[k]
-                table[a, at.on_second + k] = half * found.force[k]
-                table[a, at.on_second + 3 + k] = half * found.moment_j[k]
+                table[a, at.on_first + k] = -half * forces.force[k]
+                table[a, at.on_first + 3 + k] = half * forces.moment_i[k]
+                table[a, at.on_second + k] = half * forces.force[k]
+                table[a, at.on_second + 3 + k] = half * forces.moment_j[k]
             for k in ti.static(range(4)):
                 table[a, at.heat + k] = self.contacts.store.heat[p][k]
-            table[a, at.spent] = found.spent
-            table[a, at.dragged], table[a, at.rubbed] = half * found.dragged, half * found.rubbed
-            table[a, at.rub], table[a, at.bound] = found.rub, found.bound
-            table[a, at.rub_power], table[a, at.strain] = found.rubbed, found.stored
+            table[a, at.spent] = forces.spent
+            table[a, at.dragged], table[a, at.rubbed] = half * forces.dragged, half * forces.rubbed
+            table[a, at.rub], table[a, at.bound] = forces.rub, forces.bound
+            table[a, at.rub_power], table[a, at.strain] = forces.rubbed, forces.stored
             table[a, at.step] = 2.0 * half
             for r, c in ti.static(ti.ndrange(3, 3)):
-                table[a, at.leverage + 3 * r + c] = found.leverage[r, c]
+                table[a, at.leverage + 3 * r + c] = forces.leverage[r, c]
         ti.loop_config(serialize=ti.static(self.small))
         for i in range(self.tables.body_count[None]):
             # In the order of the pairs, so that no thread changes a bit.
-            found = self._sum_of_pairs(self.contacts.store, table, i)
+            forces = self._sum_of_pairs(self.contacts.store, table, i)
             for k in ti.static(range(6)):
-                pushed[i, k] = found[k]
+                pushed[i, k] = forces[k]
 
     @ti.func
     def _sum_of_pairs(self, store: ti.template(), table: ti.template(), i):
         """Impulse and moment of the contacts of body i with all others."""
-        found = ti.Vector.zero(ti.f64, 6)
+        total = ti.Vector.zero(ti.f64, 6)
         for a in range(store.first_of[i], store.first_of[i + 1]):
             for k in ti.static(range(6)):
-                found[k] += table[a, self.of_pair.on_first + k]
+                total[k] += table[a, self.of_pair.on_first + k]
         for s in range(store.second_start[i], store.second_start[i + 1]):
             for k in ti.static(range(6)):
-                found[k] += table[store.place_of(store.second_slot[s]), self.of_pair.on_second + k]
-        return found
+                total[k] += table[store.place_of(store.second_slot[s]), self.of_pair.on_second + k]
+        return total
 
     def bodies(self) -> np.ndarray:
         """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 8)."""
@@ -314,12 +314,12 @@ class Readings:
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 5)."""
         table, _ = self._contacts()
-        found = np.column_stack([table["strain"], table["heat"]])
-        found[:, 1] += table["dragged"]
-        found[:, 2] += table["rubbed"]
+        sums = np.column_stack([table["strain"], table["heat"]])
+        sums[:, 1] += table["dragged"]
+        sums[:, 2] += table["rubbed"]
         # What the law has taken since the last step took note of it.
-        found[:, 4] += table["spent"]
-        return found
+        sums[:, 4] += table["spent"]
+        return sums
 
     def momentum(self) -> np.ndarray:
         """Momentum of every body; impulses of loads and supports, their sums and sizes, (n, 14)."""
@@ -338,10 +338,10 @@ class Readings:
         for b in range(self.tables.bond_count[None]):
             slots = self.tables.bond_slots[b]
             schedule = self.schedule
-            found = schedule.sleeping.left_out[b]
+            left_out = schedule.sleeping.left_out[b]
             if not schedule.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
-                found = schedule.sleeping.left_out_now(b, schedule.seconds(1), False)
-            table[b, 0], table[b, 1] = found[0], found[1]
+                left_out = schedule.sleeping.left_out_now(b, schedule.seconds(1), False)
+            table[b, 0], table[b, 1] = left_out[0], left_out[1]
 
     @ti.kernel
     def _lower_bond_shares(self, share: ti.types.ndarray(dtype=ti.f64, ndim=1)):

@@ -189,40 +189,40 @@ class StepResolution(Kept):
 
     def _unstable(self, over):
         """The same of steps over their limits, (2, body_count)."""
-        found = []
+        unstable = []
         for link, own, longest in zip(_LINKS, over, self.longest):
             count, worst = int((own > 1.0 + ROUNDING).sum()), int(own.argmax())
             if count:
-                found.append(
+                unstable.append(
                     f"the step of {counted(count, 'body')} is above the longest that is stable for "
                     f"sure in {link} (body {worst} takes {own[worst]:.3g} times "
                     f"{longest[worst]:.3g} s): energy may come from nowhere, take a shorter step "
                     "(step_report)"
                 )
-        return tuple(found)
+        return tuple(unstable)
 
     def bond_slip(self) -> tuple[BondSlip, ...]:
         """The ``BondSlip`` of the run so far, or nothing where no bond slipped."""
         share, bond, time_s, count = self.slip.tolist()
         if bond < 0:
             return ()
-        found = BondSlip("SlipWeakening", _SLIPPED, share=share, weakens=self.weakens)
-        return (placed(found, self.run.model, count, bond, time_s),)
+        slip = BondSlip("SlipWeakening", _SLIPPED, share=share, weakens=self.weakens)
+        return (placed(slip, self.run.model, count, bond, time_s),)
 
     def _note_partners(self, contacts):
         """Remember steps and light partners: few contacts last until a recording."""
         self.step = np.minimum(self.step, present_steps(self.run))
         pairs, _, _ = contacts.store.near_table()
-        for one, other in (pairs.T, pairs.T[::-1]):
-            np.maximum.at(self.fastest, one, self.rate[other])
+        for body, other in (pairs.T, pairs.T[::-1]):
+            np.maximum.at(self.fastest, body, self.rate[other])
 
     def findings(self) -> tuple[str, ...]:
         """Sentences about dashpots and failures that the step did not resolve; may be empty."""
         late = np.where(self.run.state.broken(), self.run.readings.reach(), 0.0)
         worse = -self.share, late, -self._contact_shares(), self.taken
-        found = (_too_long(*look) for look in zip(worse, _ALLOWED, _TOO_LONG))
+        findings = (_too_long(*look) for look in zip(worse, _ALLOWED, _TOO_LONG))
         unstable = self._unstable(self.over)
-        return tuple(filter(None, (*unstable, *found, self._sweeps(), self._levels())))
+        return tuple(filter(None, (*unstable, *findings, self._sweeps(), self._levels())))
 
     def _levels(self):
         if not values(self.run.schedule.undivided):

@@ -165,10 +165,10 @@ class SharedVolume(Kept):
         place, orientation = self._now()
         # A motion whose square is no number is that of a runaway, which the divergence check names.
         with np.errstate(over="ignore"):
-            way = length(place - self.place) / self.run.model.body_radius
+            travelled = length(place - self.place) / self.run.model.body_radius
             # The norm of the difference of both rotation matrices.
             turn = length(orientation - self.orientation) * length(orientation + self.orientation)
-            return float((way + math.sqrt(2.0) * turn).max())
+            return float((travelled + math.sqrt(2.0) * turn).max())
 
     def _now(self):
         """Positions [m] and orientations of the bodies."""
@@ -184,18 +184,18 @@ class SharedVolume(Kept):
     def findings(self) -> tuple[str, ...]:
         """Sentences where bodies are within each other although contact is listed; or none."""
         contact, worst, first = self.run.model.contact, self.worst, _told(self.first)
-        found = [*self.at_start()]
+        findings = [*self.at_start()]
         if contact is None or worst == first:
-            return tuple(found)
+            return tuple(findings)
         law = type(contact).__name__
         advice = f"a larger {contact.knob} or more points in {law} keep them apart"
         if not contact.geometry.outer_faces:
             advice = f"{remedy(contact)} lets them touch there too"
         if worst.share > max(NOTABLE, first.share):
-            found.append(f"{_words(worst, f't = {worst.time_s:.4g} s')}: {advice}")
+            findings.append(f"{_words(worst, f't = {worst.time_s:.4g} s')}: {advice}")
         if worst.depth_share > first.depth_share:
-            found.append(f"{worst.depth}: {advice}")
-        return tuple(found)
+            findings.append(f"{worst.depth}: {advice}")
+        return tuple(findings)
 
     def at_start(self) -> tuple[str, ...]:
         """A sentence where bodies that may touch begin within each other; or none."""
@@ -217,16 +217,16 @@ class SharedVolume(Kept):
         own = np.ascontiguousarray(corners[body])
         box = np.stack([own.min(axis=1), own.max(axis=1)], axis=1)
         mass, count = np.ascontiguousarray(self.run.model.body_mass[body]), np.ones(1, np.int32)
-        found, height = np.zeros((0, 4)), np.ascontiguousarray(self.height[body])
-        while count[0] > len(found):
-            found, count = np.zeros((max(_ROOM, count[0]), 4)), np.zeros(1, np.int32)
-            _launch_pairs(last, box, own, mass, height, *self.points, found, count)
-        found = found[: count[0]]
-        pairs = body[found[:, :2].astype(np.int32)]
+        overlaps, height = np.zeros((0, 4)), np.ascontiguousarray(self.height[body])
+        while count[0] > len(overlaps):
+            overlaps, count = np.zeros((max(_ROOM, count[0]), 4)), np.zeros(1, np.int32)
+            _launch_pairs(last, box, own, mass, height, *self.points, overlaps, count)
+        overlaps = overlaps[: count[0]]
+        pairs = body[overlaps[:, :2].astype(np.int32)]
         strangers = (tied[pairs[:, 0]] != pairs[:, 1:]).all(axis=1)
-        order = np.lexsort(found[strangers][:, [1, 0]].T)
+        order = np.lexsort(overlaps[strangers][:, [1, 0]].T)
         pairs = np.sort(pairs[strangers][order], axis=1)
-        self.share, near = found[strangers][order, 2:].T
+        self.share, near = overlaps[strangers][order, 2:].T
         self.pairs, self.share = pairs[self.share > 0.0], self.share[self.share > 0.0]
         self.close = pairs[near > 0.0]
         self.depth = penetration(*corners[self.close].swapaxes(0, 1))
@@ -234,8 +234,8 @@ class SharedVolume(Kept):
 
 def _told(figures):
     """Figures as an ``Interpenetration``."""
-    share, first, second, time_s, deep, sunk, way, one, other, then = figures.tolist()
-    deepest = sunk, way, (int(one), int(other)), then
+    share, first, second, time_s, deep, sunk, travelled, body, other, then = figures.tolist()
+    deepest = sunk, travelled, (int(body), int(other)), then
     return Interpenetration(share, (int(first), int(second)), time_s, int(deep), *deepest)
 
 

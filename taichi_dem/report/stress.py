@@ -90,7 +90,7 @@ def _of_groups(
             area = area_vectors(model.mesh.points, corners)
             arm = model.mesh.points[corners].mean(axis=1) - model.centre[body]
             turned = rotation[body]
-            area, arm = (product(turned, one[:, :, None])[:, :, 0] for one in (area, arm))
+            area, arm = (product(turned, vectors[:, :, None])[:, :, 0] for vectors in (area, arm))
             share = _pressed if isinstance(effect, FacePressure) else _shared
             yield body, _outer(share(body, area, force), arm)
 
