@@ -48,7 +48,8 @@ def path(name, *lines):
 def result():
     """A result that is made up but for its report, which is that of three steps."""
     short = td.simulate(ALONE, method=METHOD, until=3e-7, progress=None)
-    return dataclasses.replace(made_result(), report=short.report)
+    heard = td.Received((0.0, 0.0, 0.0), 0, np.zeros(1), np.zeros((1, 3)), np.ones((1, 3)))
+    return dataclasses.replace(made_result(), report=short.report, receivers={"near": heard})
 
 
 @functools.cache
@@ -181,6 +182,7 @@ def _of_blast():
         "needed_effects": {"result": result()},
         "write_paraview": {"model": result().model, "frames": result().frames},
         "result.Result.attenuation": {"group": "left"},
+        "result.Result.peak_velocities": {"source": (0.0, 0.0, 0.0)},
     }
 
 
