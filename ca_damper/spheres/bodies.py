@@ -48,6 +48,7 @@ class SphereBodies:
     (horizontal, vertical), in the frame at rest. Horizontal positions count from the middle of the
     box, so that a mirrored run has the same bits. Positions run ``lead`` [s] ahead of the
     velocities, half a step in a run. floor: place at the velocities' time [m], as foreseen.
+    near: contacts that a sphere may have in the present step.
     """
 
     constant_fields = ("body",)
@@ -59,6 +60,7 @@ class SphereBodies:
         self.position = table.vector(2, ti.f64, "spheres", flat=True)
         self.velocity = table.vector(2, ti.f64, "spheres", flat=True)
         self.force = table.vector(2, ti.f64, "spheres", flat=True)
+        self.near = table.field(ti.i32, "spheres", flat=True)
         self.lead = table.field(ti.f64)
         self.floor = table.field(ti.f64)
         self.radii, self.masses = (table.field(ti.f64, kinds) for _ in range(2))
@@ -131,10 +133,10 @@ class SphereBodies:
 
     @ti.func
     def reach_of_walls(self, s, floor):
-        """Lowest and highest place of a sphere that touches no wall; floor: where it is [m]."""
+        """Lowest and highest place of a sphere that touches no wall; floor: its middle [m]."""
         body = self.body[s]
-        high = vec2(0.5 * body.width, floor + body.height) - body.radius
-        return vec2(-0.5 * body.width, floor) + body.radius, high
+        high = floor + vec2(0.5 * body.width, body.height) - body.radius
+        return floor + vec2(-0.5 * body.width, 0.0) + body.radius, high
 
     @ti.func
     def height(self, s, place):
@@ -145,18 +147,33 @@ class SphereBodies:
         return body.pull[0] * drop[0] + body.pull[1] * drop[1]
 
     @ti.func
+    def note_near(self, i):
+        """Count a contact that sphere i may have in the step."""
+        self.near[i] = self.near[i] + 1
+
+    @ti.func
     def push(self, i, force):
-        """Add a contact's force [N] on sphere i."""
+        """Add a force [N] on sphere i over the step."""
         # Not "+=", which would be an atomic addition; a scene is one thread.
         self.force[i] = self.force[i] + force
 
     @ti.func
-    def kick(self, s, i, body, dt):
-        """Take sphere i over a step under its contacts and gravity; returns its new velocity."""
+    def kick(self, s, i, impulse):
+        """Give sphere i an impulse [N s] at once."""
+        self.velocity[i] = self.velocity[i] + impulse / self.mass(s, i)
+
+    @ti.func
+    def shift(self, i, way):
+        """Move sphere i by a way [m]."""
+        self.position[i] = self.position[i] + way
+
+    @ti.func
+    def advance(self, s, i, body, dt):
+        """Take sphere i over a step under forces and gravity; returns its new velocity."""
         mass = body.mass if ti.static(self.kinds == 1) else self.mass(s, i)
         rate = self.force[i] / mass - body.pull
         velocity = self.velocity[i] + dt * rate
-        self.force[i] = vec2(0.0)
+        self.force[i], self.near[i] = vec2(0.0), 0
         self.velocity[i] = velocity
         self.position[i] = self.position[i] + dt * velocity
         return velocity
@@ -194,7 +211,7 @@ class SphereBodies:
     @ti.func
     def _put(self, s, i, place, velocity):
         self.position[i] = place - vec2(0.5 * self.body[s].width, 0.0)
-        self.velocity[i], self.force[i] = velocity, vec2(0.0)
+        self.velocity[i], self.force[i], self.near[i] = velocity, vec2(0.0), 0
 
     @ti.func
     def _scatter(self, s):

@@ -27,12 +27,13 @@ class ContactLanes:
     damping: lanes
     friction: lanes
     reach: lanes
-    yielding: lanes
+    mass: lanes
     grip: lanes
     shear: lanes
     shear_damping: lanes
     shear_yielding: lanes
     since: ti.f64
+    dt: ti.f64
 
 
 class OfSizes:
@@ -97,12 +98,13 @@ class PairContacts(OfSizes):
             damping=ti.Vector([found[k].damping for k in ti.static(range(LANES))]),
             friction=ti.Vector([found[k].friction for k in ti.static(range(LANES))]),
             reach=ti.Vector([found[k].reach for k in ti.static(range(LANES))]),
-            yielding=ti.Vector([found[k].yielding for k in ti.static(range(LANES))]),
+            mass=ti.Vector([found[k].mass for k in ti.static(range(LANES))]),
             grip=ti.Vector([found[k].grip for k in ti.static(range(LANES))]),
             shear=ti.Vector([found[k].shear for k in ti.static(range(LANES))]),
             shear_damping=ti.Vector([found[k].shear_damping for k in ti.static(range(LANES))]),
             shear_yielding=ti.Vector([found[k].shear_yielding for k in ti.static(range(LANES))]),
             since=contact.since,
+            dt=contact.dt,
         )
 
 
@@ -123,11 +125,11 @@ class WallContacts(OfSizes):
         """Take over how the container of scene s recoils."""
         for k in range(self.bodies.kinds):
             contact, recoil = self.contact[s, k], self.table.recoil[s]
-            mass = 0.5 / contact.yielding
+            share = 1.0 / (1.0 + contact.mass * recoil)
             self.recoiling[s, k] = vec3(
-                contact.damping * self.law.damping_ratio(1.0 / (1.0 + mass * recoil)),
-                contact.yielding + 0.5 * recoil,
-                contact.grip / (1.0 + self.rotation.tangential_share * mass * recoil),
+                contact.damping * self.law.damping_ratio(share),
+                contact.mass * share,
+                contact.grip / (1.0 + self.rotation.tangential_share * contact.mass * recoil),
             )
 
     @ti.func
@@ -135,7 +137,7 @@ class WallContacts(OfSizes):
         """The contacts for a step, as of the law: with side walls, and with floor and ceiling."""
         side, ends = self.contact[s, kind], self.contact[s, kind]
         recoiling = self.recoiling[s, kind]
-        ends.damping, ends.yielding = recoiling[0], recoiling[1]
+        ends.damping, ends.mass = recoiling[0], recoiling[1]
         side.grip = recoiling[2]
         return self.law.over_step(side, dt, since), self.law.over_step(ends, dt, since)
 

@@ -1,4 +1,9 @@
-"""Forces of two spheres on each other, and of the container's walls on those that touch them."""
+"""Impulses of two spheres on each other, and of the container's walls on those that touch them.
+
+An impact of a sphere that has no other contact takes both bodies over the step as if they were
+alone, by its closed form. Contacts at rest, and those of spheres that have several, act by their
+force at mid-step. Every second step goes through all of them in reverse: two are of second order.
+"""
 
 from typing import Any
 
@@ -11,7 +16,7 @@ from ca_damper.spheres.friction_history import FrictionHistory
 
 
 class SphereForces:
-    """Base of the forces in contacts; rubs: whether there is friction."""
+    """Base of what acts in contacts; rubs: whether there is friction."""
 
     def __init__(
         self,
@@ -35,15 +40,37 @@ class SpherePairForces(SphereForces):
     def __init__(self, *parts: Any):
         super().__init__(*parts)
         self.turns = self.rubs and self.rotation.turns
+        table = self.bodies.table
+        self.is_impact, self.impact = (table.field(ti.i32, "pairs") for _ in range(2))
+        self.impacts = table.field(ti.i32)
         for name in self.scratch_fields:
-            setattr(self, name, ti.Vector.field(LANES, ti.f64, shape=self.bodies.table.capacity))
+            setattr(self, name, ti.Vector.field(LANES, ti.f64, shape=table.capacity))
 
     @ti.func
-    def add(self, s, contact, which, count):
-        """Add the forces of so many pairs of a list; those that do not touch add nothing."""
+    def collide(self, s, contact, which, count, forwards):
+        """Let impacts of so many pairs of a list act; returns how many there are."""
+        impacts, touching = 0, 0
         if ti.static(self.history.remembers):
             self.history.recall(s, self.search.pair, which, count)
-        for vector in range((count + LANES - 1) // LANES):
+        for k in range(count):
+            found = self._is_impact(s, self.search.pair[s, which, k], contact)
+            self.is_impact[s, k] = found
+            if found != 0:
+                self.impact[s, impacts] = k
+                impacts += 1
+        for n in range(impacts):
+            k = self.impact[s, n if forwards else impacts - 1 - n]
+            pair = self.search.pair[s, which, k]
+            touching += self._meet(s, k, pair[0], pair[1], contact)
+        self.impacts[s] = impacts
+        return touching
+
+    @ti.func
+    def press(self, s, contact, which, count):
+        """Add the forces of the other pairs; returns how many of them touch."""
+        touching = 0
+        vectors = (count + LANES - 1) // LANES if self.impacts[s] < count else 0
+        for vector in range(vectors):
             first = LANES * vector
             pairs = [
                 self.search.pair[s, which, ti.min(first + k, count - 1)]
@@ -54,12 +81,30 @@ class SpherePairForces(SphereForces):
             self._evaluate(s, self.contacts.of_lanes(s, pairs, contact), pairs)
             for lane in ti.static(range(LANES)):
                 if first + lane < count:
-                    self._push(s, pairs[lane], lane)
+                    if self.is_impact[s, first + lane] == 0:
+                        touching += self._give(s, first + lane, pairs[lane], lane)
+        if ti.static(self.history.remembers):
+            self.history.keep(s, self.search.pair, which, count)
+        return touching
 
     @ti.func
-    def _push(self, s, pair, lane: ti.template()):
+    def _is_impact(self, s, pair, for_step):
+        """Whether a pair meets fast, and at least one of them nobody else."""
+        impact, i, j = 0, pair[0], pair[1]
+        if self.bodies.near[i] == 1 or self.bodies.near[j] == 1:
+            contact = self.contacts.between(s, i, j, for_step)
+            branch = self.bodies.position[j] - self.bodies.position[i]
+            distance = branch.norm()
+            approach = (self.bodies.velocity[i] - self.bodies.velocity[j]).dot(branch) / distance
+            if self.law.is_impact(contact, contact.reach - distance, approach):
+                impact = 1
+        return impact
+
+    @ti.func
+    def _give(self, s, k, pair, lane: ti.template()):
+        """Add the force of a lane on both spheres; returns whether there is one."""
         if ti.static(self.history.remembers):
-            self.history.store_pair(s, pair, vec2(self.spring[s][lane], self.root[s][lane]))
+            self.history.recalled[s, k] = vec2(self.spring[s][lane], self.root[s][lane])
         force = vec2(self.force_x[s][lane], self.force_y[s][lane])
         self.bodies.push(pair[0], force)
         self.bodies.push(pair[1], -force)
@@ -67,6 +112,7 @@ class SpherePairForces(SphereForces):
             share, torque = self.rotation.share(s, pair[0], pair[1]), self.torque[s][lane]
             self.rotation.twist(pair[0], share * torque)
             self.rotation.twist(pair[1], (1.0 - share) * torque)
+        return ti.cast((force != 0.0).any(), ti.i32)
 
     @ti.func
     def _recall(self, s, first, count):
@@ -78,11 +124,10 @@ class SpherePairForces(SphereForces):
         self.root[s] = ti.Vector([kept[k][1] for k in ti.static(range(LANES))])
 
     @ti.func
-    def _friction(self, s, contact, overlap, push, slip):
+    def _friction(self, s, contact, overlap, push, slip, way):
         if ti.static(self.history.remembers):
-            way, kept, last_root = contact.since * slip, self.spring[s], self.root[s]
             drag, spring, root = self.history.force(
-                *(contact, overlap, push, slip, way, kept, last_root)
+                *(contact, overlap, push, slip, way, self.spring[s], self.root[s])
             )
             touch = overlap > 0.0
             self.spring[s] = ti.select(touch, spring, 0.0)
@@ -102,10 +147,16 @@ class SpherePairForces(SphereForces):
         push = self.law.normal(contact, contact.reach - distance, rx * nx + ry * ny)
         fx, fy = -push * nx, -push * ny
         if ti.static(self.rubs):
-            slip = ry * nx - rx * ny
+            slip, way = ry * nx - rx * ny, 0.0 * push
             if ti.static(self.turns):
-                slip += distance * self._turning(s, pairs)
-            drag = self._friction(s, contact, contact.reach - distance, push, slip)
+                slip += distance * self._turning(s, self.rotation.spin, pairs)
+            if ti.static(self.history.remembers):
+                wx, wy = self._differences(self.history.velocity, pairs, 0, 1)
+                way = wy * nx - wx * ny
+                if ti.static(self.turns):
+                    way += distance * self._turning(s, self.history.spin, pairs)
+                way *= contact.since
+            drag = self._friction(s, contact, contact.reach - distance, push, slip, way)
             if self.effect_activity.is_new(s, FRICTION):
                 if (ti.select(touch, drag, 0.0) != 0.0).any():
                     self.effect_activity.note(s, FRICTION)
@@ -125,65 +176,144 @@ class SpherePairForces(SphereForces):
         return x, y
 
     @ti.func
-    def _turning(self, s, pairs: ti.template()):
+    def _turning(self, s, spin: ti.template(), pairs: ti.template()):
         """Slip by the spins of both spheres over their distance [1/s]."""
         return ti.Vector(
-            [self.rotation.turning(s, pairs[k][0], pairs[k][1]) for k in ti.static(range(LANES))]
+            [
+                self.rotation.turning(s, spin, pairs[k][0], pairs[k][1])
+                for k in ti.static(range(LANES))
+            ]
         )
+
+    @ti.func
+    def _meet(self, s, k, i, j, for_step):
+        """Let spheres i and j, the k-th pair of the list, push each other if they touch."""
+        contact = self.contacts.between(s, i, j, for_step)
+        branch = self.bodies.position[j] - self.bodies.position[i]
+        relative = self.bodies.velocity[i] - self.bodies.velocity[j]
+        distance = branch.norm()
+        normal = branch / distance
+        overlap = contact.reach - distance
+        impulse, deeper = self.law.meet(contact, overlap, relative.dot(normal))
+        if impulse > 0.0:
+            blow = -impulse * normal
+            if ti.static(self.rubs):
+                blow += self._rub(s, k, i, j, contact, overlap, impulse, normal, relative)
+            # Whoever comes nearer turns faster about the other: the angular momentum is kept.
+            tangent, across = vec2(-normal[1], normal[0]), contact.mass * relative + blow
+            blow += across.dot(tangent) * deeper / (distance - deeper) * tangent
+            self.bodies.kick(s, i, blow)
+            self.bodies.kick(s, j, -blow)
+            way = contact.mass * deeper * normal
+            self.bodies.shift(i, way / self.bodies.mass(s, i))
+            self.bodies.shift(j, -way / self.bodies.mass(s, j))
+        elif ti.static(self.history.remembers):
+            self.history.recalled[s, k] = vec2(0.0)
+        return ti.cast(impulse > 0.0, ti.i32)
+
+    @ti.func
+    def _rub(self, s, k, i, j, contact, overlap, impulse, normal, relative):
+        """Impulse of friction on sphere i [N s]."""
+        tangent, distance = vec2(-normal[1], normal[0]), contact.reach - overlap
+        slip = self.rotation.slip_of_pair(s, i, j, distance, relative.dot(tangent))
+        push, drag = impulse / contact.dt, 0.0
+        if ti.static(self.history.remembers):
+            drag = self.history.of_pair(s, k, i, j, contact, overlap, push, slip, normal)
+        else:
+            drag = self.law.friction(contact, push, slip)
+        if drag != 0.0 and self.effect_activity.is_new(s, FRICTION):
+            self.effect_activity.note(s, FRICTION)
+        if ti.static(self.rotation.turns):
+            share, torque = self.rotation.share(s, i, j), contact.dt * distance * drag
+            self.rotation.kick(s, i, share * torque)
+            self.rotation.kick(s, j, (1.0 - share) * torque)
+        return contact.dt * drag * tangent
 
 
 @ti.data_oriented
 class WallForces(SphereForces):
     """Contacts of walls and of the spheres that are expected to touch them."""
 
+    def __init__(self, *parts: Any):
+        super().__init__(*parts)
+        self.touching = self.bodies.table.field(ti.i32, "spheres")
+
     @ti.func
-    def add(self, s, contacts, low, high, speed):
-        """Add the forces of the walls; returns their sum along x [N] and how many spheres touch."""
-        total, touching = 0.0, 0
+    def find(self, s, dt, low, high, speed):
+        """Note the contacts with walls that there may be in a step; returns of how many spheres.
+
+        low, high: where a sphere that touches has its centre at mid-step [m]; speed: mean one of
+        the walls [m/s], seen from spheres that fall freely.
+        """
+        count = 0
         for k in range(self.search.sphere_count[s]):
             i = self.search.sphere[s, k]
             place, short = self.bodies.position[i], self.bodies.short_of_radius(s, i)
-            if (place < low - short).any() or (place > high + short).any():
-                if ti.static(self.history.remembers):
-                    self.history.at_walls(s, i)
-                of_sphere = self.contacts.of(s, i, contacts)
-                above, below = place - low + short, high - place + short
-                force = self._walls(s, i, of_sphere, above, below, speed)
-                self.bodies.push(i, force)
-                total += force[1]
-                touching += 1
+            way = 0.5 * dt * ti.abs(self.bodies.velocity[i] - speed) - short
+            least, most = place < low + way, place > high - way
+            if least.any() or most.any():
+                self.touching[s, count] = i
+                count += 1
+                for axis in ti.static(range(2)):
+                    self.bodies.near[i] = self.bodies.near[i] + ti.cast(least[axis] != 0, ti.i32)
+                    self.bodies.near[i] = self.bodies.near[i] + ti.cast(most[axis] != 0, ti.i32)
+        return count
+
+    @ti.func
+    def act(self, s, contacts, count, low, high, speed):
+        """Let walls push those spheres; returns their impulse along x [N s], how many touch."""
+        total, touching = 0.0, 0
+        for k in range(count):
+            i = self.touching[s, k]
+            place, short = self.bodies.position[i], self.bodies.short_of_radius(s, i)
+            if ti.static(self.history.remembers):
+                self.history.at_walls(s, i)
+            # The container recoils from those before.
+            now = speed - vec2(0.0, total * self.bodies.table.recoil[s])
+            above, below = place - low + short, high - place + short
+            pushed = self._walls(s, i, self.contacts.of(s, i, contacts), above, below, now)
+            total += pushed[0]
+            touching += ti.cast(pushed[1] > 0.0, ti.i32)
         return total, touching
 
     @ti.func
     def _walls(self, s, i, contacts, above, below, speed):
-        """Force of the four walls on sphere i [N]; way left to each wall [m]: negative overlap."""
-        relative = self.bodies.velocity[i] - speed
-        force = vec2(0.0)
+        """Let the four walls push sphere i; returns their impulse along x, and the sum of all."""
+        total, relative = vec2(0.0), self.bodies.velocity[i] - speed
         for axis in ti.static(range(2)):
             for side in ti.static((-1.0, 1.0)):
                 overlap = -(above[axis] if ti.static(side < 0.0) else below[axis])
                 wall = 2 * axis + (1 if ti.static(side > 0.0) else 0)
-                if overlap > 0.0:
-                    normal = side * ti.Vector.unit(2, axis, ti.f64)
-                    force += self._wall(s, i, wall, contacts[axis], normal, overlap, relative)
-                elif ti.static(self.history.remembers):
-                    self.history.leave(i, wall)
-        return force
+                normal = side * ti.Vector.unit(2, axis, ti.f64)
+                total += self._wall(s, i, wall, contacts[axis], normal, overlap, relative)
+        return total
 
     @ti.func
     def _wall(self, s, i, wall, contact, normal, overlap, relative):
-        """Force of the wall that lies along ``normal`` on sphere i [N]."""
-        push = self.law.normal(contact, overlap, relative.dot(normal))
-        force = -push * normal
-        if ti.static(self.rubs):
-            tangent, lever = vec2(-normal[1], normal[0]), contact.reach - overlap
-            slip = self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
-            drag = self._friction(s, i, wall, contact, overlap, push, slip, tangent)
-            if drag != 0.0 and self.effect_activity.is_new(s, FRICTION):
-                self.effect_activity.note(s, FRICTION)
-            self.rotation.twist(i, lever * drag)
-            force += drag * tangent
-        return force
+        """Let the wall that lies along ``normal`` push sphere i; as of ``_walls``."""
+        approach, impulse, deeper, moment = relative.dot(normal), 0.0, 0.0, 0.0
+        impact = self.bodies.near[i] == 1 and self.law.is_impact(contact, overlap, approach)
+        if impact:
+            impulse, deeper = self.law.meet(contact, overlap, approach)
+        elif overlap > 0.0:
+            impulse = contact.dt * self.law.normal(contact, overlap, approach)
+        blow = -impulse * normal
+        if impulse > 0.0:
+            if ti.static(self.rubs):
+                tangent, lever = vec2(-normal[1], normal[0]), contact.reach - overlap
+                slip = self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
+                push = impulse / contact.dt
+                drag = self._friction(s, i, wall, contact, overlap, push, slip, tangent)
+                if drag != 0.0 and self.effect_activity.is_new(s, FRICTION):
+                    self.effect_activity.note(s, FRICTION)
+                moment = lever * drag
+                blow += contact.dt * drag * tangent
+            self.bodies.push(i, blow / contact.dt)
+            self.rotation.twist(i, moment)
+            self.bodies.shift(i, deeper * normal)
+        elif ti.static(self.history.remembers):
+            self.history.leave(i, wall)
+        return vec2(blow[1], impulse)
 
     @ti.func
     def _friction(self, s, i, wall, contact, overlap, push, slip, tangent):

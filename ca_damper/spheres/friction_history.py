@@ -19,6 +19,7 @@ class FrictionHistory:
     """Springs of the contacts of the last step: force [N] and root of the overlap [m^(1/2)].
 
     recalled: those of present pairs, zero for new ones. wall_spring: at each wall, 2 axis + side.
+    velocity, spin: those by which spheres have come where they are.
     """
 
     def __init__(self, pair_contacts: PairContacts, remembers: bool):
@@ -32,6 +33,8 @@ class FrictionHistory:
             self.wall_spring = table.vector(2, ti.f64, "spheres", _WALLS, flat=True)
             self.wall_step = table.field(ti.i32, "spheres", flat=True)
             self.step, self.speed = table.field(ti.i32), table.field(ti.f64)
+            self.velocity = table.vector(2, ti.f64, "spheres", flat=True)
+            self.spin = table.field(ti.f64, "spheres", flat=True)
 
     @ti.func
     def reset(self, s):
@@ -42,8 +45,18 @@ class FrictionHistory:
                 self.wall_step[i] = _LONG_AGO - 1
 
     @ti.func
+    def begin(self, s, step, speed):
+        """Note the motions at the begin of a step, before contacts change them."""
+        if ti.static(self.remembers):
+            self.step[s], self.speed[s] = step, speed
+            for i in range(self.bodies.first(s), self.bodies.last(s)):
+                self.velocity[i] = self.bodies.velocity[i]
+                if ti.static(self.rotation.turns):
+                    self.spin[i] = self.rotation.spin[i]
+
+    @ti.func
     def recall(self, s, listed: ti.template(), which, count):
-        """Find the springs of so many pairs of a list, and begin to keep those of this step."""
+        """Find the springs of so many pairs of a list."""
         k, kept = 0, self.pair_count[s]
         for n in range(count):
             pair, spring = listed[s, which, n], vec2(0.0)
@@ -54,15 +67,29 @@ class FrictionHistory:
                 if (self.pair[s, k] == pair).all():
                     spring = self.pair_spring[s, k]
             self.recalled[s, n] = spring
-        self.pair_count[s] = 0
 
     @ti.func
-    def store_pair(self, s, pair, spring):
-        """Keep the spring of a pair that touches."""
-        if spring[1] > 0.0:
-            k = self.pair_count[s]
-            self.pair[s, k], self.pair_spring[s, k] = pair, spring
-            self.pair_count[s] = k + 1
+    def keep(self, s, listed: ti.template(), which, count):
+        """Keep the springs of those that touch."""
+        kept = 0
+        for n in range(count):
+            spring = self.recalled[s, n]
+            if spring[1] > 0.0:
+                self.pair[s, kept], self.pair_spring[s, kept] = listed[s, which, n], spring
+                kept += 1
+        self.pair_count[s] = kept
+
+    @ti.func
+    def of_pair(self, s, k, i, j, contact, overlap, push, slip, normal):
+        """Friction of spheres i and j, the k-th pair of the list [N]; keeps its spring."""
+        # Positions move on by the velocities as they were; slip belongs to the middle of the step.
+        across = (self.velocity[i] - self.velocity[j]).dot(vec2(-normal[1], normal[0]))
+        if ti.static(self.rotation.turns):
+            across += (contact.reach - overlap) * self.rotation.turning(s, self.spin, i, j)
+        kept, way = self.recalled[s, k], contact.since * across
+        drag, spring, root = self.force(contact, overlap, push, slip, way, kept[0], kept[1])
+        self.recalled[s, k] = vec2(spring, root)
+        return drag
 
     @ti.func
     def at_walls(self, s, i):
@@ -80,10 +107,11 @@ class FrictionHistory:
     @ti.func
     def at_wall(self, s, i, wall, contact, overlap, push, slip, tangent):
         """Friction of a sphere at a wall [N]; keeps its spring."""
-        # Positions move on by the velocities as they are; slip belongs to the middle of the step.
-        kept, lever = self.wall_spring[i, wall], contact.reach - overlap
-        relative = self.bodies.velocity[i] - vec2(0.0, self.speed[s])
-        way = contact.since * self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
+        lever = contact.reach - overlap
+        across = (self.velocity[i] - vec2(0.0, self.speed[s])).dot(tangent)
+        if ti.static(self.rotation.turns):
+            across += lever * self.spin[i]
+        kept, way = self.wall_spring[i, wall], contact.since * across
         drag, spring, root = self.force(contact, overlap, push, slip, way, kept[0], kept[1])
         self.wall_spring[i, wall] = vec2(spring, root)
         return drag
@@ -91,7 +119,7 @@ class FrictionHistory:
     @ti.func
     def force(self, contact, overlap, push, slip, way, spring, last_root):
         """Friction [N] against a slip [m/s], and the spring's force and root from now on."""
-        root = ti.sqrt(overlap)
+        root = ti.sqrt(ti.max(0.0, overlap))
         most = contact.friction * push
         stretched = self._stretched(contact, root, way, spring, last_root)
         dashpot = contact.shear_damping * self.law.dashpot(contact, root)
