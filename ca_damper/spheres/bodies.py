@@ -8,6 +8,7 @@ import taichi as ti
 from ca_damper.engine.random_numbers import uniform
 from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.spheres.contact_law import pair_numbers, wall_numbers
 from taichi_dem.kit.allocation import values
 
 # Purposes of the random numbers drawn here; the automaton has those before.
@@ -22,13 +23,17 @@ vec2 = ti.types.vector(2, ti.f64)
 
 @ti.dataclass
 class Body:
-    """Numbers of all spheres of a scene: radius of the largest [m], mean mass [kg], box [m]."""
+    """Numbers of all spheres of a scene: radius of the largest [m], mean mass [kg], box [m].
+
+    slow: square of the speed up to which bodies of any size press as at rest [m^2/s^2].
+    """
 
     radius: ti.f64
     mass: ti.f64
     width: ti.f64
     height: ti.f64
     pull: vec2
+    slow: ti.f64
     columns: ti.i32
     rows: ti.i32
 
@@ -38,7 +43,10 @@ def _body(options: Any) -> dict[str, Any]:
     columns, rows = options.lattice
     sphere = {"radius": options.radius, "mass": options.particle_mass, "pull": (0.0 - across, down)}
     box = {"width": options.width, "height": options.height, "columns": columns, "rows": rows}
-    return {**sphere, **box}
+    kinds = range(len(options.radii))
+    contacts = [pair_numbers(options, i, j) for i in kinds for j in kinds]
+    contacts += [wall_numbers(options, k) for k in kinds]
+    return {**sphere, **box, "slow": min(one["slow"] for one in contacts)}
 
 
 @ti.data_oriented
@@ -48,7 +56,8 @@ class SphereBodies:
     (horizontal, vertical), in the frame at rest. Horizontal positions count from the middle of the
     box, so that a mirrored run has the same bits. Positions run ``lead`` [s] ahead of the
     velocities, half a step in a run. floor: place at the velocities' time [m], as foreseen.
-    near: contacts that a sphere may have in the present step.
+    near: contacts that a sphere may have in the present step. calm: whether none can be an impact.
+    impacts: number of them, in the last step or so far in this one.
     """
 
     constant_fields = ("body",)
@@ -61,6 +70,7 @@ class SphereBodies:
         self.velocity = table.vector(2, ti.f64, "spheres", flat=True)
         self.force = table.vector(2, ti.f64, "spheres", flat=True)
         self.near = table.field(ti.i32, "spheres", flat=True)
+        self.calm, self.impacts = table.field(ti.i32), table.field(ti.i32)
         self.lead = table.field(ti.f64)
         self.floor = table.field(ti.f64)
         self.radii, self.masses = (table.field(ti.f64, kinds) for _ in range(2))
@@ -152,6 +162,21 @@ class SphereBodies:
         self.near[i] = self.near[i] + 1
 
     @ti.func
+    def begin(self, s, dt, least, most, speed):
+        """Note whether impacts are possible in a step, between bounds of its speeds [m/s]."""
+        against = ti.max(speed - least, most - speed).max()
+        fastest = ti.max((most - least).norm(), against)
+        # An impact goes on where it is slow, as it turns. "not" so that NaN looks for impacts.
+        fast = not (fastest * fastest < self.body[s].slow)
+        self.calm[s] = ti.cast(self.impacts[s] == 0 and not fast, ti.i32)
+        self.impacts[s] = 0
+
+    @ti.func
+    def may_meet(self, s, i):
+        """Whether a contact of sphere i may be an impact: its only one."""
+        return self.calm[s] == 0 and self.near[i] == 1
+
+    @ti.func
     def push(self, i, force):
         """Add a force [N] on sphere i over the step."""
         # Not "+=", which would be an atomic addition; a scene is one thread.
@@ -207,6 +232,8 @@ class SphereBodies:
             for i in range(self.first(s), self.last(s)):
                 self.velocity[i] = self.start_velocity[s, i - self.first(s)]
         self.lead[s], self.floor[s] = 0.0, 0.0
+        # Nothing is known of the first step's speeds.
+        self.impacts[s] = 1
 
     @ti.func
     def _put(self, s, i, place, velocity):

@@ -34,15 +34,24 @@ def fourth_root(depth):
 
 
 @ti.func
+def _series(x, factors: ti.template()):
+    """Sum of the factors, the last one first, times the powers of x."""
+    total = 0.0 * x
+    for factor in ti.static(factors):
+        total = total * x + factor
+    return total
+
+
+@ti.func
 def moved(spring, dashpot, y, u, way):
     """Take y and the approach u along a way s; spring, dashpot: k and c over the mass."""
     # exp(A s) = own + other A, with A^2 = -c A - 5/4 k: by series of an eighth of the way.
     decay, part = 0.5 * dashpot, 0.125 * way
     x = (1.25 * spring - decay * decay) * part * part
     z = decay * part
-    fall = 1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0))))
-    other = part * (1.0 - x / 6.0 * (1.0 - x / 20.0 * (1.0 - x / 42.0 * (1.0 - x / 72.0)))) / fall
-    own = (1.0 - x / 2.0 * (1.0 - x / 12.0 * (1.0 - x / 30.0 * (1.0 - x / 56.0)))) / fall
+    fall = 1.0 / _series(z, (1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 1.0 / 2.0, 1.0, 1.0))
+    other = _series(-x, (1.0 / 362880.0, 1.0 / 5040.0, 1.0 / 120.0, 1.0 / 6.0, 1.0)) * fall * part
+    own = _series(-x, (1.0 / 40320.0, 1.0 / 720.0, 1.0 / 24.0, 1.0 / 2.0, 1.0)) * fall
     own += decay * other
     for _ in ti.static(range(3)):
         own, other = (

@@ -47,7 +47,7 @@ class Contact:
     reach: distance of a centre from the other, or from the wall, when they touch [m]. mass: the
     effective one [kg]. slow: square of the speed up to which bodies press as at rest [m^2/s^2].
     grip: most friction per slip [N s/m]. shear: tangential stiffness over the root of the overlap
-    [N/m^(3/2)]. since: time moved on [s].
+    [N/m^(3/2)]. yielding: half a step over the mass [s/kg]. since: time moved on [s].
     """
 
     stiffness: ti.f64
@@ -55,6 +55,7 @@ class Contact:
     friction: ti.f64
     reach: ti.f64
     mass: ti.f64
+    yielding: ti.f64
     slow: ti.f64
     grip: ti.f64
     shear: ti.f64
@@ -223,7 +224,7 @@ class SphereContactLaw:
     @ti.func
     def over_step(self, contact, dt, since):
         """The numbers of a contact for a step [s]; since: time that positions have moved on [s]."""
-        contact.grip /= dt
+        contact.yielding, contact.grip = 0.5 * dt / contact.mass, contact.grip / dt
         contact.shear_yielding = 0.5 * SLIP_SHARE / contact.grip
         contact.since, contact.dt = since, dt
         return contact
@@ -232,8 +233,8 @@ class SphereContactLaw:
     def is_impact(self, contact, overlap, approach):
         """Whether bodies meet too fast for a contact at rest; see ``RESTING``."""
         depth = ti.max(0.0, overlap)
-        spring = 0.8 * contact.stiffness / contact.mass
-        return approach * approach + spring * depth * depth * ti.sqrt(depth) > contact.slow
+        stored = 0.8 * contact.stiffness * depth * depth * ti.sqrt(depth)
+        return contact.mass * (approach * approach - contact.slow) + stored > 0.0
 
     @ti.func
     def meet(self, contact, overlap, approach):
@@ -257,7 +258,7 @@ class SphereContactLaw:
         # keeps the order of the leapfrog.
         dashpot = self.dashpot(contact, ti.sqrt(overlap))
         force = self.elastic(contact, overlap) + dashpot * approach
-        return ti.max(0.0, force) / (1.0 + 0.5 * contact.dt * dashpot / contact.mass)
+        return ti.max(0.0, force) / (1.0 + dashpot * contact.yielding)
 
     @ti.func
     def dashpot(self, contact, root):

@@ -27,7 +27,7 @@ class ContactLanes:
     damping: lanes
     friction: lanes
     reach: lanes
-    mass: lanes
+    yielding: lanes
     grip: lanes
     shear: lanes
     shear_damping: lanes
@@ -98,7 +98,7 @@ class PairContacts(OfSizes):
             damping=ti.Vector([found[k].damping for k in ti.static(range(LANES))]),
             friction=ti.Vector([found[k].friction for k in ti.static(range(LANES))]),
             reach=ti.Vector([found[k].reach for k in ti.static(range(LANES))]),
-            mass=ti.Vector([found[k].mass for k in ti.static(range(LANES))]),
+            yielding=ti.Vector([found[k].yielding for k in ti.static(range(LANES))]),
             grip=ti.Vector([found[k].grip for k in ti.static(range(LANES))]),
             shear=ti.Vector([found[k].shear for k in ti.static(range(LANES))]),
             shear_damping=ti.Vector([found[k].shear_damping for k in ti.static(range(LANES))]),

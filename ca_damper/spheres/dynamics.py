@@ -13,9 +13,10 @@ from ca_damper.spheres.contact_law import SphereContactLaw
 from ca_damper.spheres.contacts import PairContacts, WallContacts
 from ca_damper.spheres.effect_activity import PAIRS, WALLS, EffectActivity
 from ca_damper.spheres.expected_contacts import SEARCHES
-from ca_damper.spheres.forces import SpherePairForces, WallForces
+from ca_damper.spheres.forces import SpherePairForces
 from ca_damper.spheres.friction_history import FrictionHistory
 from ca_damper.spheres.rotation import Rotation
+from ca_damper.spheres.wall_forces import WallForces
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.effect_table import EffectUse
 
@@ -127,6 +128,7 @@ class DeviceSpheres:
     @ti.func
     def _push(self, s, step, dt, since, low, high, speed):
         """Let all contacts act; returns the container's impulse on the spheres [N s]."""
+        self.bodies.begin(s, dt, self.least[s] / dt, self.most[s] / dt, speed)
         contact = self.pair_contacts.over_step(s, dt, since)
         of_walls = self.wall_contacts.over_step(s, 0, dt, since)
         # Nobody comes nearer on half a step.

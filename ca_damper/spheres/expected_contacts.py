@@ -7,12 +7,16 @@ from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import SphereBodies, vec2
 from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList
 
+vec2i = ti.types.vector(2, ti.i32)
+
 #: Steps that the lists are to serve at the present velocities.
 _STEPS = 32.0
 #: Narrowest margin as a share of the widest, the skin of the search.
 _NARROWEST = 1e-3
 #: What rounding may add up to, as a share of the radius: that of 1e8 steps and more.
 _ROUNDING = 1e-6
+# Pairs are not tested where more than two thirds of those listed touch, and no impact is possible.
+_NEARLY_ALL = 3
 
 
 @ti.data_oriented
@@ -24,7 +28,7 @@ class ExpectedContacts:
         self.full = self.cells.full
         self.pair = table.vector(2, ti.i32, 2, "pairs")
         self.sphere = table.field(ti.i32, "spheres")
-        for name in ("pair_count", "sphere_count"):
+        for name in ("pair_count", "sphere_count", "most_touch"):
             setattr(self, name, table.field(ti.i32))
         self.floor = table.field(ti.f64)
         for name in ("margin", "nearer"):
@@ -90,9 +94,10 @@ class ExpectedContacts:
     @ti.func
     def _list_pairs(self, s, margin):
         """List pairs that may touch before they come nearer by a margin [m]."""
-        near, count = 2.0 * self.bodies.body[s].radius + self._reach(s, margin), 0
-        self.cells.each_pair(s, near, self._list_pair, count)
-        self.pair_count[s] = count
+        reach, count = 2.0 * self.bodies.body[s].radius, vec2i(0)
+        self.cells.each_pair(s, vec2(reach, reach + self._reach(s, margin)), self._list_pair, count)
+        self.pair_count[s] = count[0]
+        self.most_touch[s] = ti.cast(_NEARLY_ALL * count[1] > (_NEARLY_ALL - 1) * count[0], ti.i32)
 
     @ti.func
     def _list_spheres(self, s, low, high):
@@ -107,26 +112,30 @@ class ExpectedContacts:
 
     @ti.func
     def _list_pair(self, s, i, j, reach, count: ti.template()):
-        """List a pair nearer than a reach [m], and count it."""
-        near = reach - self.bodies.short_of_reach(s, i, j)
-        if (self.bodies.position[j] - self.bodies.position[i]).norm_sqr() < near * near:
-            self.pair[s, EXPECTED, count] = ti.Vector([i, j])
-            count = count + 1
+        """List a pair nearer than reach[1]; count those, and those nearer than reach[0]."""
+        square = (self.bodies.position[j] - self.bodies.position[i]).norm_sqr()
+        short = self.bodies.short_of_reach(s, i, j)
+        touching, near = reach[0] - short, reach[1] - short
+        if square < near * near:
+            self.pair[s, EXPECTED, count[0]] = ti.Vector([i, j])
+            count = count + vec2i(1, ti.cast(square < touching * touching, ti.i32))
 
     @ti.func
     def find(self, s, reach):
         """Find the pairs that are to be evaluated: the list that they are in, and their number."""
-        count = 0
-        for k in range(self.pair_count[s]):
-            pair = self.pair[s, EXPECTED, k]
-            branch = self.bodies.position[pair[1]] - self.bodies.position[pair[0]]
-            touching = reach - self.bodies.short_of_reach(s, pair[0], pair[1])
-            if branch.norm_sqr() < touching * touching:
-                self.pair[s, TOUCHING, count] = pair
-                count += 1
-                self.bodies.note_near(pair[0])
-                self.bodies.note_near(pair[1])
-        return TOUCHING, count
+        which, count = EXPECTED, self.pair_count[s]
+        if self.most_touch[s] == 0 or self.bodies.calm[s] == 0:
+            which, count = TOUCHING, 0
+            for k in range(self.pair_count[s]):
+                pair = self.pair[s, EXPECTED, k]
+                branch = self.bodies.position[pair[1]] - self.bodies.position[pair[0]]
+                touching = reach - self.bodies.short_of_reach(s, pair[0], pair[1])
+                if branch.norm_sqr() < touching * touching:
+                    self.pair[s, TOUCHING, count] = pair
+                    count += 1
+                    self.bodies.note_near(pair[0])
+                    self.bodies.note_near(pair[1])
+        return which, count
 
     @ti.func
     def each_listed_pair(self, s, contact, visit: ti.template(), count: ti.template()):

@@ -1,4 +1,4 @@
-"""Impulses of two spheres on each other, and of the container's walls on those that touch them.
+"""Impulses of two spheres on each other; ``wall_forces`` has those of the walls.
 
 An impact of a sphere that has no other contact takes both bodies over the step as if they were
 alone, by its closed form. Contacts at rest, and those of spheres that have several, act by their
@@ -13,6 +13,9 @@ from ca_damper.spheres.bodies import vec2
 from ca_damper.spheres.contacts import LANES, OfSizes
 from ca_damper.spheres.effect_activity import FRICTION, EffectActivity
 from ca_damper.spheres.friction_history import FrictionHistory
+
+#: How a pair acts in a step.
+APART, RESTS, IMPACT = range(3)
 
 
 class SphereForces:
@@ -41,8 +44,8 @@ class SpherePairForces(SphereForces):
         super().__init__(*parts)
         self.turns = self.rubs and self.rotation.turns
         table = self.bodies.table
-        self.is_impact, self.impact = (table.field(ti.i32, "pairs") for _ in range(2))
-        self.impacts = table.field(ti.i32)
+        self.impact, self.resting = (table.field(ti.i32, "pairs") for _ in range(2))
+        self.rest = table.field(ti.i32)
         for name in self.scratch_fields:
             setattr(self, name, ti.Vector.field(LANES, ti.f64, shape=table.capacity))
 
@@ -52,53 +55,71 @@ class SpherePairForces(SphereForces):
         impacts, touching = 0, 0
         if ti.static(self.history.remembers):
             self.history.recall(s, self.search.pair, which, count)
-        for k in range(count):
-            found = self._is_impact(s, self.search.pair[s, which, k], contact)
-            self.is_impact[s, k] = found
-            if found != 0:
-                self.impact[s, impacts] = k
-                impacts += 1
+        if self.bodies.calm[s] != 0:
+            self.rest[s] = count
+            for k in range(count):
+                self.resting[s, k] = k
+        else:
+            impacts = self._sort(s, contact, which, count)
         for n in range(impacts):
             k = self.impact[s, n if forwards else impacts - 1 - n]
             pair = self.search.pair[s, which, k]
             touching += self._meet(s, k, pair[0], pair[1], contact)
-        self.impacts[s] = impacts
+        self.bodies.impacts[s] = impacts
         return touching
+
+    @ti.func
+    def _sort(self, s, contact, which, count):
+        """Note which pairs are impacts, returns how many, and which press as at rest."""
+        impacts, rest = 0, 0
+        for k in range(count):
+            kind = self._kind(s, self.search.pair[s, which, k], contact)
+            if kind == IMPACT:
+                self.impact[s, impacts] = k
+                impacts += 1
+            elif kind == RESTS:
+                self.resting[s, rest] = k
+                rest += 1
+            elif ti.static(self.history.remembers):
+                self.history.recalled[s, k] = vec2(0.0)
+        self.rest[s] = rest
+        return impacts
 
     @ti.func
     def press(self, s, contact, which, count):
         """Add the forces of the other pairs; returns how many of them touch."""
-        touching = 0
-        vectors = (count + LANES - 1) // LANES if self.impacts[s] < count else 0
-        for vector in range(vectors):
+        touching, rest = 0, self.rest[s]
+        for vector in range((rest + LANES - 1) // LANES):
             first = LANES * vector
-            pairs = [
-                self.search.pair[s, which, ti.min(first + k, count - 1)]
-                for k in ti.static(range(LANES))
+            which_of = [
+                self.resting[s, ti.min(first + lane, rest - 1)] for lane in ti.static(range(LANES))
             ]
+            pairs = [self.search.pair[s, which, which_of[lane]] for lane in ti.static(range(LANES))]
             if ti.static(self.history.remembers):
-                self._recall(s, first, count)
+                self._recall(s, which_of)
             self._evaluate(s, self.contacts.of_lanes(s, pairs, contact), pairs)
             for lane in ti.static(range(LANES)):
-                if first + lane < count:
-                    if self.is_impact[s, first + lane] == 0:
-                        touching += self._give(s, first + lane, pairs[lane], lane)
+                if first + lane < rest:
+                    touching += self._give(s, which_of[lane], pairs[lane], lane)
         if ti.static(self.history.remembers):
             self.history.keep(s, self.search.pair, which, count)
         return touching
 
     @ti.func
-    def _is_impact(self, s, pair, for_step):
-        """Whether a pair meets fast, and at least one of them nobody else."""
-        impact, i, j = 0, pair[0], pair[1]
-        if self.bodies.near[i] == 1 or self.bodies.near[j] == 1:
+    def _kind(self, s, pair, for_step):
+        """How a pair acts: an impact is fast, and at least one of them has no other contact."""
+        kind, i, j = RESTS, pair[0], pair[1]
+        if self.bodies.may_meet(s, i) or self.bodies.may_meet(s, j):
             contact = self.contacts.between(s, i, j, for_step)
             branch = self.bodies.position[j] - self.bodies.position[i]
             distance = branch.norm()
             approach = (self.bodies.velocity[i] - self.bodies.velocity[j]).dot(branch) / distance
-            if self.law.is_impact(contact, contact.reach - distance, approach):
-                impact = 1
-        return impact
+            overlap = contact.reach - distance
+            if self.law.is_impact(contact, overlap, approach):
+                kind = IMPACT
+            elif overlap <= 0.0:
+                kind = APART
+        return kind
 
     @ti.func
     def _give(self, s, k, pair, lane: ti.template()):
@@ -115,11 +136,9 @@ class SpherePairForces(SphereForces):
         return ti.cast((force != 0.0).any(), ti.i32)
 
     @ti.func
-    def _recall(self, s, first, count):
+    def _recall(self, s, which_of: ti.template()):
         """Take the springs of a vector of contacts from the history."""
-        kept = [
-            self.history.recalled[s, ti.min(first + k, count - 1)] for k in ti.static(range(LANES))
-        ]
+        kept = [self.history.recalled[s, which_of[k]] for k in ti.static(range(LANES))]
         self.spring[s] = ti.Vector([kept[k][0] for k in ti.static(range(LANES))])
         self.root[s] = ti.Vector([kept[k][1] for k in ti.static(range(LANES))])
 
@@ -228,95 +247,3 @@ class SpherePairForces(SphereForces):
             self.rotation.kick(s, i, share * torque)
             self.rotation.kick(s, j, (1.0 - share) * torque)
         return contact.dt * drag * tangent
-
-
-@ti.data_oriented
-class WallForces(SphereForces):
-    """Contacts of walls and of the spheres that are expected to touch them."""
-
-    def __init__(self, *parts: Any):
-        super().__init__(*parts)
-        self.touching = self.bodies.table.field(ti.i32, "spheres")
-
-    @ti.func
-    def find(self, s, dt, low, high, speed):
-        """Note the contacts with walls that there may be in a step; returns of how many spheres.
-
-        low, high: where a sphere that touches has its centre at mid-step [m]; speed: mean one of
-        the walls [m/s], seen from spheres that fall freely.
-        """
-        count = 0
-        for k in range(self.search.sphere_count[s]):
-            i = self.search.sphere[s, k]
-            place, short = self.bodies.position[i], self.bodies.short_of_radius(s, i)
-            way = 0.5 * dt * ti.abs(self.bodies.velocity[i] - speed) - short
-            least, most = place < low + way, place > high - way
-            if least.any() or most.any():
-                self.touching[s, count] = i
-                count += 1
-                for axis in ti.static(range(2)):
-                    self.bodies.near[i] = self.bodies.near[i] + ti.cast(least[axis] != 0, ti.i32)
-                    self.bodies.near[i] = self.bodies.near[i] + ti.cast(most[axis] != 0, ti.i32)
-        return count
-
-    @ti.func
-    def act(self, s, contacts, count, low, high, speed):
-        """Let walls push those spheres; returns their impulse along x [N s], how many touch."""
-        total, touching = 0.0, 0
-        for k in range(count):
-            i = self.touching[s, k]
-            place, short = self.bodies.position[i], self.bodies.short_of_radius(s, i)
-            if ti.static(self.history.remembers):
-                self.history.at_walls(s, i)
-            # The container recoils from those before.
-            now = speed - vec2(0.0, total * self.bodies.table.recoil[s])
-            above, below = place - low + short, high - place + short
-            pushed = self._walls(s, i, self.contacts.of(s, i, contacts), above, below, now)
-            total += pushed[0]
-            touching += ti.cast(pushed[1] > 0.0, ti.i32)
-        return total, touching
-
-    @ti.func
-    def _walls(self, s, i, contacts, above, below, speed):
-        """Let the four walls push sphere i; returns their impulse along x, and the sum of all."""
-        total, relative = vec2(0.0), self.bodies.velocity[i] - speed
-        for axis in ti.static(range(2)):
-            for side in ti.static((-1.0, 1.0)):
-                overlap = -(above[axis] if ti.static(side < 0.0) else below[axis])
-                wall = 2 * axis + (1 if ti.static(side > 0.0) else 0)
-                normal = side * ti.Vector.unit(2, axis, ti.f64)
-                total += self._wall(s, i, wall, contacts[axis], normal, overlap, relative)
-        return total
-
-    @ti.func
-    def _wall(self, s, i, wall, contact, normal, overlap, relative):
-        """Let the wall that lies along ``normal`` push sphere i; as of ``_walls``."""
-        approach, impulse, deeper, moment = relative.dot(normal), 0.0, 0.0, 0.0
-        impact = self.bodies.near[i] == 1 and self.law.is_impact(contact, overlap, approach)
-        if impact:
-            impulse, deeper = self.law.meet(contact, overlap, approach)
-        elif overlap > 0.0:
-            impulse = contact.dt * self.law.normal(contact, overlap, approach)
-        blow = -impulse * normal
-        if impulse > 0.0:
-            if ti.static(self.rubs):
-                tangent, lever = vec2(-normal[1], normal[0]), contact.reach - overlap
-                slip = self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
-                push = impulse / contact.dt
-                drag = self._friction(s, i, wall, contact, overlap, push, slip, tangent)
-                if drag != 0.0 and self.effect_activity.is_new(s, FRICTION):
-                    self.effect_activity.note(s, FRICTION)
-                moment = lever * drag
-                blow += contact.dt * drag * tangent
-            self.bodies.push(i, blow / contact.dt)
-            self.rotation.twist(i, moment)
-            self.bodies.shift(i, deeper * normal)
-        elif ti.static(self.history.remembers):
-            self.history.leave(i, wall)
-        return vec2(blow[1], impulse)
-
-    @ti.func
-    def _friction(self, s, i, wall, contact, overlap, push, slip, tangent):
-        if ti.static(self.history.remembers):
-            return self.history.at_wall(s, i, wall, contact, overlap, push, slip, tangent)
-        return self.law.friction(contact, push, slip)

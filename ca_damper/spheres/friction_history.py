@@ -10,7 +10,7 @@ from ca_damper.spheres.bodies import vec2
 from ca_damper.spheres.contacts import PairContacts
 
 #: Walls of a box: two axes, two sides.
-_WALLS = 4
+WALLS = 4
 _LONG_AGO = -2
 
 
@@ -30,8 +30,8 @@ class FrictionHistory:
             self.pair, self.pair_count = table.vector(2, ti.i32, "pairs"), table.field(ti.i32)
             self.pair_spring = table.vector(2, ti.f64, "pairs")
             self.recalled = table.vector(2, ti.f64, "pairs")
-            self.wall_spring = table.vector(2, ti.f64, "spheres", _WALLS, flat=True)
-            self.wall_step = table.field(ti.i32, "spheres", flat=True)
+            self.wall_spring = table.vector(2, ti.f64, "spheres", WALLS, flat=True)
+            self.wall_step = table.field(ti.i32, "spheres", WALLS, flat=True)
             self.step, self.speed = table.field(ti.i32), table.field(ti.f64)
             self.velocity = table.vector(2, ti.f64, "spheres", flat=True)
             self.spin = table.field(ti.f64, "spheres", flat=True)
@@ -42,7 +42,8 @@ class FrictionHistory:
         if ti.static(self.remembers):
             self.pair_count[s], self.step[s], self.speed[s] = 0, _LONG_AGO, 0.0
             for i in range(self.bodies.first(s), self.bodies.last(s)):
-                self.wall_step[i] = _LONG_AGO - 1
+                for wall in ti.static(range(WALLS)):
+                    self.wall_step[i, wall] = _LONG_AGO - 1
 
     @ti.func
     def begin(self, s, step, speed):
@@ -92,28 +93,18 @@ class FrictionHistory:
         return drag
 
     @ti.func
-    def at_walls(self, s, i):
-        """Prepare the springs of a sphere that touches a wall in this step."""
-        if self.wall_step[i] != self.step[s] - 1:
-            for wall in ti.static(range(_WALLS)):
-                self.wall_spring[i, wall] = vec2(0.0)
-        self.wall_step[i] = self.step[s]
-
-    @ti.func
-    def leave(self, i, wall):
-        """Forget the spring of a sphere at a wall that it does not touch."""
-        self.wall_spring[i, wall] = vec2(0.0)
-
-    @ti.func
     def at_wall(self, s, i, wall, contact, overlap, push, slip, tangent):
         """Friction of a sphere at a wall [N]; keeps its spring."""
         lever = contact.reach - overlap
         across = (self.velocity[i] - vec2(0.0, self.speed[s])).dot(tangent)
         if ti.static(self.rotation.turns):
             across += lever * self.spin[i]
-        kept, way = self.wall_spring[i, wall], contact.since * across
+        kept, way = vec2(0.0), contact.since * across
+        if self.wall_step[i, wall] == self.step[s] - 1:
+            kept = self.wall_spring[i, wall]
         drag, spring, root = self.force(contact, overlap, push, slip, way, kept[0], kept[1])
         self.wall_spring[i, wall] = vec2(spring, root)
+        self.wall_step[i, wall] = self.step[s]
         return drag
 
     @ti.func
@@ -164,9 +155,9 @@ class FrictionHistory:
     def of_walls(self, s, i, contact, above, below):
         """Energy of the springs of a sphere at walls [J]; way left to each wall [m]."""
         total, relative = 0.0, self.bodies.velocity[i] - vec2(0.0, self.speed[s])
-        if self.wall_step[i] == self.step[s]:
-            for axis in ti.static(range(2)):
-                for side in ti.static(range(2)):
+        for axis in ti.static(range(2)):
+            for side in ti.static(range(2)):
+                if self.wall_step[i, 2 * axis + side] == self.step[s]:
                     room = above[axis] if ti.static(side == 0) else below[axis]
                     # As along the tangent of ``WallForces``: of (normal x, y), (-y, x).
                     sign = 1.0 if ti.static((axis == 0) == (side == 1)) else -1.0
