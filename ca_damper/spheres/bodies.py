@@ -85,14 +85,16 @@ class SphereBodies:
     def upload(self, fillings: Fillings) -> None:
         """Write the numbers of each scene to the device."""
         fillings.write(self.body, _body)
-        fillings.write(self.radii, lambda one: one.radii)
-        fillings.write(self.masses, lambda one: one.masses)
+        fillings.write(self.radii, lambda filling: filling.radii)
+        fillings.write(self.masses, lambda filling: filling.masses)
         if self.kinds > 1:
-            fillings.write(self.counts, lambda one: [count for count, _ in one.sizes])
+            fillings.write(self.counts, lambda filling: [count for count, _ in filling.sizes])
         if self.given:
-            fillings.write(self.start, lambda one: np.reshape(one.start, (-1, 2)))
+            fillings.write(self.start, lambda filling: np.reshape(filling.start, (-1, 2)))
         if self.thrown:
-            fillings.write(self.start_velocity, lambda one: np.reshape(one.start_velocity, (-1, 2)))
+            fillings.write(
+                self.start_velocity, lambda filling: np.reshape(filling.start_velocity, (-1, 2))
+            )
 
     @ti.func
     def first(self, s):

@@ -96,9 +96,9 @@ def pair_numbers(options: Any, one: int = 0, other: int = 0) -> dict[str, float]
     return _numbers(options, partner, radius, mass, options.radii[one] + options.radii[other])
 
 
-def _reduced(values: tuple[float, ...], one: int, other: int) -> float:
+def _reduced(values: tuple[float, ...], kind: int, other_kind: int) -> float:
     """Product over sum of two of the values, half of each where they are equal."""
-    first, second = values[one], values[other]
+    first, second = values[kind], values[other_kind]
     return 0.5 * first if first == second else first * second / (first + second)
 
 
@@ -136,13 +136,13 @@ def contact_members(
     kinds: Sequence[Mapping[str, float]], tangential_share: float
 ) -> dict[str, np.ndarray]:
     """Members of Contacts of several kinds, (kinds,) each, before a step is known."""
-    found = {name: np.array([one[name] for one in kinds]) for name in kinds[0]}
+    members = {name: np.array([kind[name] for kind in kinds]) for name in kinds[0]}
     return {
-        **{name: found[name] for name in _KEPT},
-        "grip": SLIP_SHARE * tangential_share * found["mass"],
+        **{name: members[name] for name in _KEPT},
+        "grip": SLIP_SHARE * tangential_share * members["mass"],
         # The normal stiffness at an overlap is 3/2 k d^(1/2).
-        "shear": 1.5 * found["shear_ratio"] * found["stiffness"],
-        "shear_damping": np.sqrt(tangential_share * found["shear_ratio"]),
+        "shear": 1.5 * members["shear_ratio"] * members["stiffness"],
+        "shear_damping": np.sqrt(tangential_share * members["shear_ratio"]),
     }
 
 

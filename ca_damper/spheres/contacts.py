@@ -82,27 +82,27 @@ class PairContacts(OfSizes):
     @ti.func
     def between(self, s, i, j, contact):
         """The contact of spheres i and j for a step; contact: what ``over_step`` gave for it."""
-        found = contact
+        own = contact
         if ti.static(self.kinds > 1):
-            found = self.law.over_step(self.at_rest(s, i, j), contact.dt, contact.since)
-        return found
+            own = self.law.over_step(self.at_rest(s, i, j), contact.dt, contact.since)
+        return own
 
     @ti.func
     def of_lanes(self, s, pairs: ti.template(), contact):
         """The contacts of a vector of pairs; one for all of them where there is one size."""
         if ti.static(self.kinds == 1):
             return contact
-        found = [self.between(s, *pairs[k], contact) for k in ti.static(range(LANES))]
+        contacts = [self.between(s, *pairs[k], contact) for k in ti.static(range(LANES))]
         return ContactLanes(
-            stiffness=ti.Vector([found[k].stiffness for k in ti.static(range(LANES))]),
-            damping=ti.Vector([found[k].damping for k in ti.static(range(LANES))]),
-            friction=ti.Vector([found[k].friction for k in ti.static(range(LANES))]),
-            reach=ti.Vector([found[k].reach for k in ti.static(range(LANES))]),
-            yielding=ti.Vector([found[k].yielding for k in ti.static(range(LANES))]),
-            grip=ti.Vector([found[k].grip for k in ti.static(range(LANES))]),
-            shear=ti.Vector([found[k].shear for k in ti.static(range(LANES))]),
-            shear_damping=ti.Vector([found[k].shear_damping for k in ti.static(range(LANES))]),
-            shear_yielding=ti.Vector([found[k].shear_yielding for k in ti.static(range(LANES))]),
+            stiffness=ti.Vector([contacts[k].stiffness for k in ti.static(range(LANES))]),
+            damping=ti.Vector([contacts[k].damping for k in ti.static(range(LANES))]),
+            friction=ti.Vector([contacts[k].friction for k in ti.static(range(LANES))]),
+            reach=ti.Vector([contacts[k].reach for k in ti.static(range(LANES))]),
+            yielding=ti.Vector([contacts[k].yielding for k in ti.static(range(LANES))]),
+            grip=ti.Vector([contacts[k].grip for k in ti.static(range(LANES))]),
+            shear=ti.Vector([contacts[k].shear for k in ti.static(range(LANES))]),
+            shear_damping=ti.Vector([contacts[k].shear_damping for k in ti.static(range(LANES))]),
+            shear_yielding=ti.Vector([contacts[k].shear_yielding for k in ti.static(range(LANES))]),
             since=contact.since,
             dt=contact.dt,
         )

@@ -60,15 +60,15 @@ class ExpectedContacts:
         to the end of this one, in which bodies come nearer by at most half as much again.
         """
         drift = vec2(0.0, low[1] - self.floor[s])
-        way = vec2((most - least).norm(), ti.max(drift - least, most - drift).max())
-        nearer, margin = self.nearer[s] + way, self.margin[s] - way
-        self.cells.moved(s, way[0])
-        if self.cells.refresh(s, way[0]) or not (nearer[0] < margin[0]):
-            self.margin[s][0], nearer[0] = self._margin(s, way[0]), 0.0
+        spread = vec2((most - least).norm(), ti.max(drift - least, most - drift).max())
+        nearer, margin = self.nearer[s] + spread, self.margin[s] - spread
+        self.cells.moved(s, spread[0])
+        if self.cells.refresh(s, spread[0]) or not (nearer[0] < margin[0]):
+            self.margin[s][0], nearer[0] = self._margin(s, spread[0]), 0.0
             self._list_pairs(s, self.margin[s][0])
             self._count_unlisted(s)
         if not (nearer[1] < margin[1]):
-            self.margin[s][1], nearer[1] = self._margin(s, way[1]), 0.0
+            self.margin[s][1], nearer[1] = self._margin(s, spread[1]), 0.0
             reach = self._reach(s, self.margin[s][1])
             self._list_spheres(s, low + reach, high - reach)
             self._count_unlisted(s)
@@ -81,10 +81,10 @@ class ExpectedContacts:
         self.unlisted[s] = tests - self.pair_count[s] - self.sphere_count[s]
 
     @ti.func
-    def _margin(self, s, way):
+    def _margin(self, s, spread):
         """How far apart to list [m], for a way in a step [m]."""
         skin = self.cells.grid[s].skin
-        return ti.max(_NARROWEST * skin, ti.min(_STEPS * way, skin))
+        return ti.max(_NARROWEST * skin, ti.min(_STEPS * spread, skin))
 
     @ti.func
     def _reach(self, s, margin):

@@ -189,9 +189,9 @@ class SpherePairForces(SphereForces):
         self, field: ti.template(), pairs: ti.template(), a: ti.template(), b: ti.template()
     ):
         """Components of field[pair[a]] - field[pair[b]], a vector each."""
-        found = [field[pairs[k][a]] - field[pairs[k][b]] for k in ti.static(range(LANES))]
-        x = ti.Vector([found[k][0] for k in ti.static(range(LANES))])
-        y = ti.Vector([found[k][1] for k in ti.static(range(LANES))])
+        differences = [field[pairs[k][a]] - field[pairs[k][b]] for k in ti.static(range(LANES))]
+        x = ti.Vector([differences[k][0] for k in ti.static(range(LANES))])
+        y = ti.Vector([differences[k][1] for k in ti.static(range(LANES))])
         return x, y
 
     @ti.func

@@ -99,37 +99,37 @@ class FrictionHistory:
         across = (self.velocity[i] - vec2(0.0, self.speed[s])).dot(tangent)
         if ti.static(self.rotation.turns):
             across += lever * self.spin[i]
-        kept, way = vec2(0.0), contact.since * across
+        kept, slid = vec2(0.0), contact.since * across
         if self.wall_step[i, wall] == self.step[s] - 1:
             kept = self.wall_spring[i, wall]
-        drag, spring, root = self.force(contact, overlap, push, slip, way, kept[0], kept[1])
+        drag, spring, root = self.force(contact, overlap, push, slip, slid, kept[0], kept[1])
         self.wall_spring[i, wall] = vec2(spring, root)
         self.wall_step[i, wall] = self.step[s]
         return drag
 
     @ti.func
-    def force(self, contact, overlap, push, slip, way, spring, last_root):
+    def force(self, contact, overlap, push, slip, slid, spring, last_root):
         """Friction [N] against a slip [m/s], and the spring's force and root from now on."""
         root = ti.sqrt(ti.max(0.0, overlap))
         most = contact.friction * push
-        stretched = self._stretched(contact, root, way, spring, last_root)
+        stretched = self._stretched(contact, root, slid, spring, last_root)
         dashpot = contact.shear_damping * self.law.dashpot(contact, root)
         damped = (stretched + dashpot * slip) / (1.0 + dashpot * contact.shear_yielding)
         return -_clipped(damped, most), _clipped(stretched, most), root
 
     @ti.func
-    def _stretched(self, contact, root, way, spring, last_root):
+    def _stretched(self, contact, root, slid, spring, last_root):
         """Force [N] of a spring after a way [m], at the root of the present overlap."""
         held = spring * ti.select(root < last_root, root / last_root, 1.0)
-        return held + contact.shear * root * way
+        return held + contact.shear * root * slid
 
     @ti.func
-    def _stored(self, contact, overlap, way, spring):
+    def _stored(self, contact, overlap, slid, spring):
         """Energy [J] and force [N] of a spring after a further way [m], at an overlap [m]."""
         energy, force = 0.0, 0.0
         if overlap > 0.0:
             root, most = ti.sqrt(overlap), contact.friction * self.law.elastic(contact, overlap)
-            stretched = self._stretched(contact, root, way, spring[0], spring[1])
+            stretched = self._stretched(contact, root, slid, spring[0], spring[1])
             force = _clipped(stretched, most)
             energy = 0.5 * force * force / (contact.shear * root)
         return energy, force
@@ -146,8 +146,8 @@ class FrictionHistory:
             distance, relative = branch.norm(), self.bodies.velocity[i] - self.bodies.velocity[j]
             across = (relative[1] * branch[0] - relative[0] * branch[1]) / distance
             slip = self.rotation.slip_of_pair(s, i, j, distance, across)
-            overlap, way = contact.reach - distance, self.bodies.lead[s] * slip
-            energy, force = self._stored(contact, overlap, way, self.pair_spring[s, k])
+            overlap, slid = contact.reach - distance, self.bodies.lead[s] * slip
+            energy, force = self._stored(contact, overlap, slid, self.pair_spring[s, k])
             total, power = total + energy, power + ti.max(0.0, force * slip)
         return total, power
 
@@ -162,9 +162,9 @@ class FrictionHistory:
                     # As along the tangent of ``WallForces``: of (normal x, y), (-y, x).
                     sign = 1.0 if ti.static((axis == 0) == (side == 1)) else -1.0
                     slip = self.rotation.slip_at_wall(i, room, sign * relative[1 - axis])
-                    way = self.bodies.lead[s] * slip
+                    slid = self.bodies.lead[s] * slip
                     spring = self.wall_spring[i, 2 * axis + side]
-                    energy, _ = self._stored(contact, contact.reach - room, way, spring)
+                    energy, _ = self._stored(contact, contact.reach - room, slid, spring)
                     total += energy
         return total
 
