@@ -251,7 +251,7 @@ def draw(path, rows):
                 axes.plot([row.bodies for row in some], moved, **look)
         for scene in dict.fromkeys(row.scene for row in rows):
             axes.plot([], [], MARKS[scene], color=BLACK, label=WORDS[scene])
-        axes.set(xscale="log", yscale="log", xlabel="bodies", ylabel="least bytes moved [GB/s]")
+        axes.set(xscale="log", yscale="log", xlabel="bodies [1]", ylabel="least bytes moved [GB/s]")
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
 
 

@@ -8,7 +8,6 @@ import taichi as ti
 from ca_damper.engine.random_numbers import uniform
 from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
-from ca_damper.spheres.contact_law import pair_numbers, wall_numbers
 from taichi_dem.kit.allocation import values
 
 # Purposes of the random numbers drawn here; the automaton has those before.
@@ -23,17 +22,13 @@ vec2 = ti.types.vector(2, ti.f64)
 
 @ti.dataclass
 class Body:
-    """Numbers of all spheres of a scene: radius of the largest [m], mean mass [kg], box [m].
-
-    slow: square of the speed up to which bodies of any size press as at rest [m^2/s^2].
-    """
+    """Numbers of all spheres of a scene: radius of the largest [m], mean mass [kg], box [m]."""
 
     radius: ti.f64
     mass: ti.f64
     width: ti.f64
     height: ti.f64
     pull: vec2
-    slow: ti.f64
     columns: ti.i32
     rows: ti.i32
 
@@ -43,10 +38,7 @@ def _body(options: Any) -> dict[str, Any]:
     columns, rows = options.lattice
     sphere = {"radius": options.radius, "mass": options.particle_mass, "pull": (0.0 - across, down)}
     box = {"width": options.width, "height": options.height, "columns": columns, "rows": rows}
-    kinds = range(len(options.radii))
-    contacts = [pair_numbers(options, i, j) for i in kinds for j in kinds]
-    contacts += [wall_numbers(options, k) for k in kinds]
-    return {**sphere, **box, "slow": min(one["slow"] for one in contacts)}
+    return {**sphere, **box}
 
 
 @ti.data_oriented
@@ -56,8 +48,6 @@ class SphereBodies:
     (horizontal, vertical), in the frame at rest. Horizontal positions count from the middle of the
     box, so that a mirrored run has the same bits. Positions run ``lead`` [s] ahead of the
     velocities, half a step in a run. floor: place at the velocities' time [m], as foreseen.
-    near: contacts that a sphere may have in the present step. calm: whether none can be an impact.
-    impacts: number of them, in the last step or so far in this one.
     """
 
     constant_fields = ("body",)
@@ -69,8 +59,6 @@ class SphereBodies:
         self.position = table.vector(2, ti.f64, "spheres", flat=True)
         self.velocity = table.vector(2, ti.f64, "spheres", flat=True)
         self.force = table.vector(2, ti.f64, "spheres", flat=True)
-        self.near = table.field(ti.i32, "spheres", flat=True)
-        self.calm, self.impacts = table.field(ti.i32), table.field(ti.i32)
         self.lead = table.field(ti.f64)
         self.floor = table.field(ti.f64)
         self.radii, self.masses = (table.field(ti.f64, kinds) for _ in range(2))
@@ -85,16 +73,14 @@ class SphereBodies:
     def upload(self, fillings: Fillings) -> None:
         """Write the numbers of each scene to the device."""
         fillings.write(self.body, _body)
-        fillings.write(self.radii, lambda filling: filling.radii)
-        fillings.write(self.masses, lambda filling: filling.masses)
+        fillings.write(self.radii, lambda one: one.radii)
+        fillings.write(self.masses, lambda one: one.masses)
         if self.kinds > 1:
-            fillings.write(self.counts, lambda filling: [count for count, _ in filling.sizes])
+            fillings.write(self.counts, lambda one: [count for count, _ in one.sizes])
         if self.given:
-            fillings.write(self.start, lambda filling: np.reshape(filling.start, (-1, 2)))
+            fillings.write(self.start, lambda one: np.reshape(one.start, (-1, 2)))
         if self.thrown:
-            fillings.write(
-                self.start_velocity, lambda filling: np.reshape(filling.start_velocity, (-1, 2))
-            )
+            fillings.write(self.start_velocity, lambda one: np.reshape(one.start_velocity, (-1, 2)))
 
     @ti.func
     def first(self, s):
@@ -145,10 +131,10 @@ class SphereBodies:
 
     @ti.func
     def reach_of_walls(self, s, floor):
-        """Lowest and highest place of a sphere that touches no wall; floor: its middle [m]."""
+        """Lowest and highest place of a sphere that touches no wall; floor: where it is [m]."""
         body = self.body[s]
-        high = floor + vec2(0.5 * body.width, body.height) - body.radius
-        return floor + vec2(-0.5 * body.width, 0.0) + body.radius, high
+        high = vec2(0.5 * body.width, floor + body.height) - body.radius
+        return vec2(-0.5 * body.width, floor) + body.radius, high
 
     @ti.func
     def height(self, s, place):
@@ -159,48 +145,18 @@ class SphereBodies:
         return body.pull[0] * drop[0] + body.pull[1] * drop[1]
 
     @ti.func
-    def note_near(self, i):
-        """Count a contact that sphere i may have in the step."""
-        self.near[i] = self.near[i] + 1
-
-    @ti.func
-    def begin(self, s, dt, least, most, speed):
-        """Note whether impacts are possible in a step, between bounds of its speeds [m/s]."""
-        against = ti.max(speed - least, most - speed).max()
-        fastest = ti.max((most - least).norm(), against)
-        # An impact goes on where it is slow, as it turns. "not" so that NaN looks for impacts.
-        fast = not (fastest * fastest < self.body[s].slow)
-        self.calm[s] = ti.cast(self.impacts[s] == 0 and not fast, ti.i32)
-        self.impacts[s] = 0
-
-    @ti.func
-    def may_meet(self, s, i):
-        """Whether a contact of sphere i may be an impact: its only one."""
-        return self.calm[s] == 0 and self.near[i] == 1
-
-    @ti.func
     def push(self, i, force):
-        """Add a force [N] on sphere i over the step."""
+        """Add a contact's force [N] on sphere i."""
         # Not "+=", which would be an atomic addition; a scene is one thread.
         self.force[i] = self.force[i] + force
 
     @ti.func
-    def kick(self, s, i, impulse):
-        """Give sphere i an impulse [N s] at once."""
-        self.velocity[i] = self.velocity[i] + impulse / self.mass(s, i)
-
-    @ti.func
-    def shift(self, i, way):
-        """Move sphere i by a way [m]."""
-        self.position[i] = self.position[i] + way
-
-    @ti.func
-    def advance(self, s, i, body, dt):
-        """Take sphere i over a step under forces and gravity; returns its new velocity."""
+    def kick(self, s, i, body, dt):
+        """Take sphere i over a step under its contacts and gravity; returns its new velocity."""
         mass = body.mass if ti.static(self.kinds == 1) else self.mass(s, i)
         rate = self.force[i] / mass - body.pull
         velocity = self.velocity[i] + dt * rate
-        self.force[i], self.near[i] = vec2(0.0), 0
+        self.force[i] = vec2(0.0)
         self.velocity[i] = velocity
         self.position[i] = self.position[i] + dt * velocity
         return velocity
@@ -234,13 +190,11 @@ class SphereBodies:
             for i in range(self.first(s), self.last(s)):
                 self.velocity[i] = self.start_velocity[s, i - self.first(s)]
         self.lead[s], self.floor[s] = 0.0, 0.0
-        # Nothing is known of the first step's speeds.
-        self.impacts[s] = 1
 
     @ti.func
     def _put(self, s, i, place, velocity):
         self.position[i] = place - vec2(0.5 * self.body[s].width, 0.0)
-        self.velocity[i], self.force[i], self.near[i] = velocity, vec2(0.0), 0
+        self.velocity[i], self.force[i] = velocity, vec2(0.0)
 
     @ti.func
     def _scatter(self, s):

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper.spheres.contact_flow import flow, fourth_root
 from taichi_dem.kit.elementary import fifth_root
 
 # Exponents p of the dashpot k d^(3/2) + c d^p d', by the name of the law.
@@ -25,10 +24,6 @@ FRICTION_LAWS = ("viscous", "history")
 
 # Integral of 2 / sqrt(1 - x^(5/2)) from 0 to 1.
 _HERTZ = 2.0 * math.sqrt(math.pi) * math.gamma(1.4) / math.gamma(0.9)
-
-#: Impacts whose peak acceleration is below so many times gravity count as contacts at rest.
-RESTING = 10.0
-_KEPT = ("stiffness", "damping", "friction", "reach", "mass", "slow")
 
 # Part of a contact's slip that friction may take away in one step. Up to six contacts of a sphere
 # act at once; at a quarter each they slow it down and never turn it round, so nothing chatters.
@@ -44,19 +39,16 @@ _BISECTIONS = 40
 class Contact:
     """Numbers of one kind of contact.
 
-    reach: distance of a centre from the other, or from the wall, when they touch [m]. mass: the
-    effective one [kg]. slow: square of the speed up to which bodies press as at rest [m^2/s^2].
-    grip: most friction per slip [N s/m]. shear: tangential stiffness over the root of the overlap
-    [N/m^(3/2)]. yielding: half a step over the mass [s/kg]. since: time moved on [s].
+    reach: distance of a centre from the other, or from the wall, when they touch [m]. yielding:
+    half a step over the effective mass [s/kg]. grip: most friction per slip [N s/m]. shear:
+    tangential stiffness over the root of the overlap [N/m^(3/2)]. since: time moved on [s].
     """
 
     stiffness: ti.f64
     damping: ti.f64
     friction: ti.f64
     reach: ti.f64
-    mass: ti.f64
     yielding: ti.f64
-    slow: ti.f64
     grip: ti.f64
     shear: ti.f64
     shear_damping: ti.f64
@@ -96,9 +88,9 @@ def pair_numbers(options: Any, one: int = 0, other: int = 0) -> dict[str, float]
     return _numbers(options, partner, radius, mass, options.radii[one] + options.radii[other])
 
 
-def _reduced(values: tuple[float, ...], kind: int, other_kind: int) -> float:
+def _reduced(values: tuple[float, ...], one: int, other: int) -> float:
     """Product over sum of two of the values, half of each where they are equal."""
-    first, second = values[kind], values[other_kind]
+    first, second = values[one], values[other]
     return 0.5 * first if first == second else first * second / (first + second)
 
 
@@ -120,29 +112,22 @@ def _numbers(options, partner, radius, mass, reach):
         "damping": damping(restitution, power, mass, stiffness, speed),
         "friction": friction,
         "mass": mass,
-        "slow": _slow_square(mass / stiffness, options),
         "reach": reach,
     }
-
-
-def _slow_square(share, options):
-    """Square of the impact speed [m/s] up to which the spheres press as at rest; share: m / k."""
-    most = RESTING * math.hypot(*options.fall)
-    # The elastic energy at the overlap of that acceleration, d^(3/2) = m a / k.
-    return 0.8 * float(np.cbrt(share * share * most**5))
 
 
 def contact_members(
     kinds: Sequence[Mapping[str, float]], tangential_share: float
 ) -> dict[str, np.ndarray]:
     """Members of Contacts of several kinds, (kinds,) each, before a step is known."""
-    members = {name: np.array([kind[name] for kind in kinds]) for name in kinds[0]}
+    found = {name: np.array([one[name] for one in kinds]) for name in kinds[0]}
     return {
-        **{name: members[name] for name in _KEPT},
-        "grip": SLIP_SHARE * tangential_share * members["mass"],
+        **{name: found[name] for name in ("stiffness", "damping", "friction", "reach")},
+        "yielding": 0.5 / found["mass"],
+        "grip": SLIP_SHARE * tangential_share * found["mass"],
         # The normal stiffness at an overlap is 3/2 k d^(1/2).
-        "shear": 1.5 * members["shear_ratio"] * members["stiffness"],
-        "shear_damping": np.sqrt(tangential_share * members["shear_ratio"]),
+        "shear": 1.5 * found["shear_ratio"] * found["stiffness"],
+        "shear_damping": np.sqrt(tangential_share * found["shear_ratio"]),
     }
 
 
@@ -224,32 +209,11 @@ class SphereContactLaw:
     @ti.func
     def over_step(self, contact, dt, since):
         """The numbers of a contact for a step [s]; since: time that positions have moved on [s]."""
-        contact.yielding, contact.grip = 0.5 * dt / contact.mass, contact.grip / dt
+        contact.yielding *= dt
+        contact.grip /= dt
         contact.shear_yielding = 0.5 * SLIP_SHARE / contact.grip
         contact.since, contact.dt = since, dt
         return contact
-
-    @ti.func
-    def is_impact(self, contact, overlap, approach):
-        """Whether bodies meet too fast for a contact at rest; see ``RESTING``."""
-        depth = ti.max(0.0, overlap)
-        stored = 0.8 * contact.stiffness * depth * depth * ti.sqrt(depth)
-        return contact.mass * (approach * approach - contact.slow) + stored > 0.0
-
-    @ti.func
-    def meet(self, contact, overlap, approach):
-        """Impulse [N s] of a contact in a step, and by how much it deepens the overlap [m].
-
-        Of free flight the overlap is that at mid-step, the approach [m/s] the mean; never a pull.
-        """
-        half, dashpot = 0.5 * contact.dt, contact.damping
-        if ti.static(self.printed):
-            # c d^(1/2) = (c d^(1/4)) d^(1/4), with the first as it is in the middle.
-            dashpot *= fourth_root(ti.max(0.0, overlap))
-        spring, dashpot = contact.stiffness / contact.mass, dashpot / contact.mass
-        after = flow(spring, dashpot, overlap - half * approach, approach, contact.dt)
-        impulse = contact.mass * (approach - after[1])
-        return impulse, ti.select(impulse > 0.0, after[0] - half * after[1] - overlap, 0.0)
 
     @ti.func
     def normal(self, contact, overlap, approach):

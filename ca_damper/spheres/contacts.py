@@ -33,7 +33,6 @@ class ContactLanes:
     shear_damping: lanes
     shear_yielding: lanes
     since: ti.f64
-    dt: ti.f64
 
 
 class OfSizes:
@@ -82,29 +81,28 @@ class PairContacts(OfSizes):
     @ti.func
     def between(self, s, i, j, contact):
         """The contact of spheres i and j for a step; contact: what ``over_step`` gave for it."""
-        own = contact
+        found = contact
         if ti.static(self.kinds > 1):
-            own = self.law.over_step(self.at_rest(s, i, j), contact.dt, contact.since)
-        return own
+            found = self.law.over_step(self.at_rest(s, i, j), contact.dt, contact.since)
+        return found
 
     @ti.func
     def of_lanes(self, s, pairs: ti.template(), contact):
         """The contacts of a vector of pairs; one for all of them where there is one size."""
         if ti.static(self.kinds == 1):
             return contact
-        contacts = [self.between(s, *pairs[k], contact) for k in ti.static(range(LANES))]
+        found = [self.between(s, *pairs[k], contact) for k in ti.static(range(LANES))]
         return ContactLanes(
-            stiffness=ti.Vector([contacts[k].stiffness for k in ti.static(range(LANES))]),
-            damping=ti.Vector([contacts[k].damping for k in ti.static(range(LANES))]),
-            friction=ti.Vector([contacts[k].friction for k in ti.static(range(LANES))]),
-            reach=ti.Vector([contacts[k].reach for k in ti.static(range(LANES))]),
-            yielding=ti.Vector([contacts[k].yielding for k in ti.static(range(LANES))]),
-            grip=ti.Vector([contacts[k].grip for k in ti.static(range(LANES))]),
-            shear=ti.Vector([contacts[k].shear for k in ti.static(range(LANES))]),
-            shear_damping=ti.Vector([contacts[k].shear_damping for k in ti.static(range(LANES))]),
-            shear_yielding=ti.Vector([contacts[k].shear_yielding for k in ti.static(range(LANES))]),
+            stiffness=ti.Vector([found[k].stiffness for k in ti.static(range(LANES))]),
+            damping=ti.Vector([found[k].damping for k in ti.static(range(LANES))]),
+            friction=ti.Vector([found[k].friction for k in ti.static(range(LANES))]),
+            reach=ti.Vector([found[k].reach for k in ti.static(range(LANES))]),
+            yielding=ti.Vector([found[k].yielding for k in ti.static(range(LANES))]),
+            grip=ti.Vector([found[k].grip for k in ti.static(range(LANES))]),
+            shear=ti.Vector([found[k].shear for k in ti.static(range(LANES))]),
+            shear_damping=ti.Vector([found[k].shear_damping for k in ti.static(range(LANES))]),
+            shear_yielding=ti.Vector([found[k].shear_yielding for k in ti.static(range(LANES))]),
             since=contact.since,
-            dt=contact.dt,
         )
 
 
@@ -125,11 +123,11 @@ class WallContacts(OfSizes):
         """Take over how the container of scene s recoils."""
         for k in range(self.bodies.kinds):
             contact, recoil = self.contact[s, k], self.table.recoil[s]
-            share = 1.0 / (1.0 + contact.mass * recoil)
+            mass = 0.5 / contact.yielding
             self.recoiling[s, k] = vec3(
-                contact.damping * self.law.damping_ratio(share),
-                contact.mass * share,
-                contact.grip / (1.0 + self.rotation.tangential_share * contact.mass * recoil),
+                contact.damping * self.law.damping_ratio(1.0 / (1.0 + mass * recoil)),
+                contact.yielding + 0.5 * recoil,
+                contact.grip / (1.0 + self.rotation.tangential_share * mass * recoil),
             )
 
     @ti.func
@@ -137,7 +135,7 @@ class WallContacts(OfSizes):
         """The contacts for a step, as of the law: with side walls, and with floor and ceiling."""
         side, ends = self.contact[s, kind], self.contact[s, kind]
         recoiling = self.recoiling[s, kind]
-        ends.damping, ends.mass = recoiling[0], recoiling[1]
+        ends.damping, ends.yielding = recoiling[0], recoiling[1]
         side.grip = recoiling[2]
         return self.law.over_step(side, dt, since), self.law.over_step(ends, dt, since)
 

@@ -13,10 +13,9 @@ from ca_damper.spheres.contact_law import SphereContactLaw
 from ca_damper.spheres.contacts import PairContacts, WallContacts
 from ca_damper.spheres.effect_activity import PAIRS, WALLS, EffectActivity
 from ca_damper.spheres.expected_contacts import SEARCHES
-from ca_damper.spheres.forces import SpherePairForces
+from ca_damper.spheres.forces import SpherePairForces, WallForces
 from ca_damper.spheres.friction_history import FrictionHistory
 from ca_damper.spheres.rotation import Rotation
-from ca_damper.spheres.wall_forces import WallForces
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.effect_table import EffectUse
 
@@ -58,7 +57,6 @@ class DeviceSpheres:
         self.pair_forces = SpherePairForces(self.pair_contacts, *shared)
         self.wall_forces = WallForces(self.wall_contacts, *shared)
         self.crushed, self.speed = table.field(ti.i32), table.field(ti.f64)
-        self.least, self.most = table.vector(2, ti.f64), table.vector(2, ti.f64)
         self.given, self.lost = table.field(ti.f64), table.field(ti.f64)
         self.held, self.allowed = table.field(ti.f64), table.field(ti.f64)
 
@@ -85,7 +83,6 @@ class DeviceSpheres:
         self.search.clear(s)
         self.given[s], self.lost[s] = 0.0, -ti.math.inf
         self.allowed[s], self.speed[s] = 0.0, 0.0
-        self.least[s], self.most[s] = vec2(0.0), vec2(0.0)
 
     @ti.func
     def advance(self, s, step, motion):
@@ -108,13 +105,16 @@ class DeviceSpheres:
     @ti.func
     def step(self, s, step, dt, since, motion):
         """Advance spheres whose positions run half a step ahead; returns their impulse [N s]."""
+        floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
+        low, high = self.bodies.reach_of_walls(s, floor)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
-        speed = vec2(0.0, motion.v + 0.5 * dt * motion.a) + 0.5 * dt * self.bodies.body[s].pull
-        low, high = self.bodies.reach_of_walls(s, vec2(0.0, motion.x) + 0.5 * dt * speed)
-        self.search.refresh(s, self.least[s], self.most[s], low, high)
-        self.history.begin(s, step, motion.v)
+        pull = self.bodies.body[s].pull
+        speed = vec2(0.5 * dt * pull[0], motion.v + 0.5 * dt * (motion.a + pull[1]))
+        self.search.refresh(s, low, high)
+        if ti.static(self.history.remembers):
+            self.history.step[s], self.history.speed[s] = step, motion.v
         self.effect_activity.step[s] = step
-        force = self._push(s, step, dt, since, low, high, speed) / dt
+        force = self._push(s, dt, since, low, high, speed)
         self.move(s, dt)
         # The container recoils by dt force / M over the step; half of it on the way.
         recoil = dt * force * self.table.recoil[s]
@@ -126,24 +126,19 @@ class DeviceSpheres:
         return -dt * force
 
     @ti.func
-    def _push(self, s, step, dt, since, low, high, speed):
-        """Let all contacts act; returns the container's impulse on the spheres [N s]."""
-        self.bodies.begin(s, dt, self.least[s] / dt, self.most[s] / dt, speed)
+    def _push(self, s, dt, since, low, high, speed):
+        """Add the forces of all contacts; returns the container's force on the spheres [N]."""
         contact = self.pair_contacts.over_step(s, dt, since)
-        of_walls = self.wall_contacts.over_step(s, 0, dt, since)
-        # Nobody comes nearer on half a step.
-        ahead = 0.5 * (self.most[s] - self.least[s]).norm()
-        which, count = self.search.find(s, contact.reach + ahead)
-        spheres = self.wall_forces.find(s, dt, low, high, speed)
-        pairs = self.pair_forces.collide(s, contact, which, count, step % 2 == 0)
-        impulse, walls = self.wall_forces.act(s, of_walls, spheres, low, high, speed)
-        pairs += self.pair_forces.press(s, contact, which, count)
-        if pairs > 0:
+        which, count = self.search.find(s, contact.reach)
+        if count > 0:
             self.effect_activity.note(s, PAIRS)
-        if walls > 0:
-            self.effect_activity.note(s, WALLS)
+        self.pair_forces.add(s, contact, which, count)
         self.search.count_skipped(s)
-        return impulse
+        of_walls = self.wall_contacts.over_step(s, 0, dt, since)
+        force, touching = self.wall_forces.add(s, of_walls, low, high, speed)
+        if touching > 0:
+            self.effect_activity.note(s, WALLS)
+        return force
 
     @ti.func
     def move(self, s, dt):
@@ -151,12 +146,12 @@ class DeviceSpheres:
         body = self.bodies.body[s]
         least, most = vec2(ti.math.inf), vec2(-ti.math.inf)
         for i in range(self.bodies.first(s), self.bodies.last(s)):
-            velocity = self.bodies.advance(s, i, body, dt)
-            self.rotation.advance(s, i, dt)
+            velocity = self.bodies.kick(s, i, body, dt)
+            self.rotation.kick(s, i, dt)
             # Not by ti.min and ti.max: what they do about NaN takes five instructions more.
             least = ti.select(velocity < least, velocity, least)
             most = ti.select(velocity > most, velocity, most)
-        self.least[s], self.most[s] = dt * least, dt * most
+        self.search.note_motion(s, dt * least, dt * most)
 
     @ti.func
     def energy(self, s):

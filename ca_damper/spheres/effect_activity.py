@@ -71,7 +71,7 @@ class EffectActivity(EventCounts):
         turn, unseen = motion[1] > 0.0, "" if touches else _UNSEEN
         contact = EffectUse("normal contact", "contacts seen", touches, whole="what contacts took")
         turning = replace(contact, effect="rotation", events=touches if turn else 0)
-        uses = (
+        found = (
             replace(contact, share=_share(power, 0), steers=True, kept=unseen, skipped=skipped),
             replace(contact, effect="friction", share=_share(power, 1), kept=unseen),
             replace(
@@ -81,7 +81,7 @@ class EffectActivity(EventCounts):
                 kept=unseen if turn else "",
             ),
         )
-        return tuple(use for name in effects for use in uses if use.effect == name)
+        return tuple(use for name in effects for use in found if use.effect == name)
 
 
 def _share(sums: np.ndarray, which: int) -> float | None:

@@ -15,7 +15,7 @@ _STEPS = 32.0
 _NARROWEST = 1e-3
 #: What rounding may add up to, as a share of the radius: that of 1e8 steps and more.
 _ROUNDING = 1e-6
-# Pairs are not tested where more than two thirds of those listed touch, and no impact is possible.
+# Pairs are not tested where more than two thirds of those listed touch.
 _NEARLY_ALL = 3
 
 
@@ -31,7 +31,7 @@ class ExpectedContacts:
         for name in ("pair_count", "sphere_count", "most_touch"):
             setattr(self, name, table.field(ti.i32))
         self.floor = table.field(ti.f64)
-        for name in ("margin", "nearer"):
+        for name in ("margin", "nearer", "least", "most"):
             setattr(self, name, table.vector(2, ti.f64))
         for name in ("unlisted", "skipped"):
             setattr(self, name, table.field(ti.i64))
@@ -51,27 +51,30 @@ class ExpectedContacts:
         """Empty the lists of scene s; the next refresh renews them."""
         self.cells.forget(s)
         self.nearer[s], self.margin[s] = vec2(0.0), vec2(0.0)
+        self.least[s], self.most[s] = vec2(0.0), vec2(0.0)
 
     @ti.func
-    def refresh(self, s, least, most, low, high):
-        """Renew the lists if they may lack a contact; low, high: where spheres touch walls [m].
+    def note_motion(self, s, least, most):
+        """Note between which bounds the spheres have moved in a step [m]."""
+        self.least[s], self.most[s] = least, most
 
-        least, most: between which bounds the spheres have moved in the last step [m]. Lists serve
-        to the end of this one, in which bodies come nearer by at most half as much again.
-        """
+    @ti.func
+    def refresh(self, s, low, high):
+        """Renew the lists if they may lack a contact; low, high: where spheres touch walls [m]."""
         drift = vec2(0.0, low[1] - self.floor[s])
-        spread = vec2((most - least).norm(), ti.max(drift - least, most - drift).max())
-        nearer, margin = self.nearer[s] + spread, self.margin[s] - spread
-        self.cells.moved(s, spread[0])
-        if self.cells.refresh(s, spread[0]) or not (nearer[0] < margin[0]):
-            self.margin[s][0], nearer[0] = self._margin(s, spread[0]), 0.0
-            self._list_pairs(s, self.margin[s][0])
+        least, most = self.least[s], self.most[s]
+        way = vec2((most - least).norm(), ti.max(drift - least, most - drift).max())
+        nearer, margin = self.nearer[s] + way, self.margin[s]
+        self.cells.moved(s, way[0])
+        if self.cells.refresh(s) or not (nearer[0] < margin[0]):
+            margin[0], nearer[0] = self._margin(s, way[0]), 0.0
+            self._list_pairs(s, margin[0])
             self._count_unlisted(s)
         if not (nearer[1] < margin[1]):
-            self.margin[s][1], nearer[1] = self._margin(s, spread[1]), 0.0
-            reach = self._reach(s, self.margin[s][1])
-            self._list_spheres(s, low + reach, high - reach)
+            margin[1], nearer[1] = self._margin(s, way[1]), 0.0
+            self._list_spheres(s, low + self._reach(s, margin[1]), high - self._reach(s, margin[1]))
             self._count_unlisted(s)
+        self.margin[s] = margin
         self.nearer[s], self.floor[s] = nearer, low[1]
 
     @ti.func
@@ -81,10 +84,10 @@ class ExpectedContacts:
         self.unlisted[s] = tests - self.pair_count[s] - self.sphere_count[s]
 
     @ti.func
-    def _margin(self, s, spread):
+    def _margin(self, s, way):
         """How far apart to list [m], for a way in a step [m]."""
         skin = self.cells.grid[s].skin
-        return ti.max(_NARROWEST * skin, ti.min(_STEPS * spread, skin))
+        return ti.max(_NARROWEST * skin, ti.min(_STEPS * way, skin))
 
     @ti.func
     def _reach(self, s, margin):
@@ -124,7 +127,7 @@ class ExpectedContacts:
     def find(self, s, reach):
         """Find the pairs that are to be evaluated: the list that they are in, and their number."""
         which, count = EXPECTED, self.pair_count[s]
-        if self.most_touch[s] == 0 or self.bodies.calm[s] == 0:
+        if self.most_touch[s] == 0:
             which, count = TOUCHING, 0
             for k in range(self.pair_count[s]):
                 pair = self.pair[s, EXPECTED, k]
@@ -133,8 +136,6 @@ class ExpectedContacts:
                 if branch.norm_sqr() < touching * touching:
                     self.pair[s, TOUCHING, count] = pair
                     count += 1
-                    self.bodies.note_near(pair[0])
-                    self.bodies.note_near(pair[1])
         return which, count
 
     @ti.func

@@ -195,8 +195,8 @@ class Spheres:
 
     def left_out(self, particles: int) -> tuple[Estimate, ...]:
         """Estimates of the effects that are not computed."""
-        estimates = () if self.rotation else (rotation_estimate(self, particles),)
-        return (*estimates, air_estimate(self))
+        found = () if self.rotation else (rotation_estimate(self, particles),)
+        return (*found, air_estimate(self))
 
     @property
     def radius(self) -> float:

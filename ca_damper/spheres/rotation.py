@@ -35,16 +35,16 @@ class Rotation:
         return share
 
     @ti.func
-    def turning(self, s, spin: ti.template(), i, j):
-        """Slip of two spheres by spins over their distance [1/s]."""
+    def turning(self, s, i, j):
+        """Slip of two spheres by their spins over their distance [1/s]."""
         share = self.share(s, i, j)
-        return share * spin[i] + (1.0 - share) * spin[j]
+        return share * self.spin[i] + (1.0 - share) * self.spin[j]
 
     @ti.func
     def slip_of_pair(self, s, i, j, distance, slip):
         """Slip [m/s] of two spheres whose centres are a distance [m] apart."""
         if ti.static(self.turns):
-            return slip + distance * self.turning(s, self.spin, i, j)
+            return slip + distance * self.turning(s, i, j)
         return slip
 
     @ti.func
@@ -56,22 +56,16 @@ class Rotation:
 
     @ti.func
     def twist(self, i, torque):
-        """Add a torque [N m] on sphere i over the step."""
+        """Add a torque [N m] on sphere i."""
         # Not "+=", which would be an atomic addition; a scene is one thread.
         if ti.static(self.turns):
             self.torque[i] = self.torque[i] + torque
 
     @ti.func
-    def kick(self, s, i, moment):
-        """Give sphere i an angular impulse [N m s] at once."""
-        if ti.static(self.turns):
-            self.spin[i] = self.spin[i] + moment / self._inertia(s, i)
-
-    @ti.func
-    def advance(self, s, i, dt):
+    def kick(self, s, i, dt):
         """Change the spin of sphere i by its torques over a step [s]."""
         if ti.static(self.turns):
-            self.kick(s, i, dt * self.torque[i])
+            self.spin[i] = self.spin[i] + dt * self.torque[i] / self._inertia(s, i)
             self.torque[i] = 0.0
 
     @ti.func

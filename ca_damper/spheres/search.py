@@ -54,7 +54,11 @@ class AllPairs:
         """Nothing was remembered."""
 
     @ti.func
-    def refresh(self, s, least, most, low, high):
+    def note_motion(self, s, least, most):
+        """Nothing to note."""
+
+    @ti.func
+    def refresh(self, s, low, high):
         """Nothing to refresh."""
 
     @ti.func
@@ -71,8 +75,6 @@ class AllPairs:
         if branch.norm_sqr() < touching * touching and count < self.places:
             self.pair[s, TOUCHING, count] = ti.Vector([i, j])
             count = count + 1
-            self.bodies.note_near(i)
-            self.bodies.note_near(j)
 
     @ti.func
     def each_listed_pair(self, s, contact, visit: ti.template(), count: ti.template()):
@@ -137,10 +139,10 @@ class CellList:
             visit(s, near[0], near[1], contact, count)
 
     @ti.func
-    def refresh(self, s, ahead):
-        """Renew the list if spheres may cross the skin on a way ahead; returns whether it did."""
+    def refresh(self, s):
+        """Renew the list if spheres may have crossed the skin; returns whether it did."""
         # "not" so that NaN searches too.
-        used_up = not (self.travel[s] + ahead < self.grid[s].skin)
+        used_up = not (self.travel[s] < self.grid[s].skin)
         if used_up:
             self._search(s)
             self.travel[s] = 0.0
