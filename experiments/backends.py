@@ -257,9 +257,7 @@ def draw(path, rows):
 
 def renewed(page, rows):
     """A page of Markdown with another table, and another first line that says where it is from."""
-    header, cells = TABLE.cells(TABLE.rows(rows))
-    lines = [header, ["---"] * len(header), *cells]
-    table = "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
+    table = study.markdown_of(*TABLE.cells(TABLE.rows(rows)))
     place = f"{study.processor()}, {runtime.usable_cores()} cores, {time.strftime('%d %B %Y')}"
     page = re.sub(r"(?m)^Measured on .*$", f"Measured on {place}:", page, count=1)
     return re.sub(r"(?m)(^\|.*\n)+", table, page, count=1)

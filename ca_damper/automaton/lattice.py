@@ -163,7 +163,7 @@ class Lattice:
 
     @ti.func
     def cell_from(self, s, column, k, direction):
-        """The k-th cell of a column, counted upwards (way 1) or downwards (-1)."""
+        """The k-th cell of a column, counted upwards (direction 1) or downwards (-1)."""
         return self.cell_of(s, column, k if direction > 0 else self.size.rows[s] - 1 - k)
 
     @ti.func
@@ -183,7 +183,7 @@ class Lattice:
 
     @ti.func
     def column_beside(self, s, cell, direction):
-        """Lowest cell of the column to the right (way 1) or left (-1) of a cell, a wall."""
+        """Lowest cell of the column to the right (direction 1) or left (-1) of a cell, a wall."""
         return ti.cast(self.bottom[s, cell], ti.i32) + direction * self.size.height[s]
 
     @ti.func

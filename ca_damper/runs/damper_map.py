@@ -121,8 +121,8 @@ class DamperMap(ScenesResult):
         return collect_and_collide(np.array(self.amplitudes), self.gaps[:, :, None])
 
     def _axes(self) -> dict[str, Any]:
-        axes = {name_of: (getattr(self, name), unit) for name_of, (name, unit) in _AXES.items()}
-        return {name_of: axis for name_of, axis in axes.items() if axis[0] != (None,)}
+        axes = {key: (getattr(self, name), unit) for key, (name, unit) in _AXES.items()}
+        return {key: axis for key, axis in axes.items() if axis[0] != (None,)}
 
     def _variables(self) -> dict[str, Any]:
         variables = {

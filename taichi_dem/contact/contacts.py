@@ -162,8 +162,8 @@ class Contacts:
         """Set the body skin of body i: half the skin, or more where it is fast."""
         # A few fragments are much faster than the rest and would cause most of the searches.
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
-        skin = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
-        self.body_skin[i] = ti.max(0.5 * self.skin[i], skin)
+        ahead = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
+        self.body_skin[i] = ti.max(0.5 * self.skin[i], ahead)
         self.horizon[i] = self.path[i] + self.body_skin[i]
 
     @ti.func

@@ -308,9 +308,9 @@ def _given_way(maps, laws, links, opening, bodies):
         pulled = product(transposed(lever), laws)
         np.add.at(force, side, product(pulled, opening).sum(axis=1))
         np.add.at(block, side, product(pulled, lever).sum(axis=1))
-    directions = np.zeros((count, 6, 6))
-    directions[bodies] = -_STEP * product(inverse(block[bodies]), force[bodies])
-    return sum(product(lever, directions[side][:, None]) for lever, side in zip(maps, links))
+    motions = np.zeros((count, 6, 6))
+    motions[bodies] = -_STEP * product(inverse(block[bodies]), force[bodies])
+    return sum(product(lever, motions[side][:, None]) for lever, side in zip(maps, links))
 
 
 def _bodies_at(tetrahedra, corners, point_count):

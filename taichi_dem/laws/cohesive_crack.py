@@ -187,9 +187,9 @@ def _direction(opening, sliding):
 
 
 @ti.func
-def _traction(direction):
-    """Traction over the strength; way: beyond the onset, 1 where one line would end."""
-    return ti.max(0.0, 1.0 - _FIRST * direction, _SECOND * (_END - direction))
+def _traction(past):
+    """Traction over the strength; past: jump beyond the onset, 1 where one line would end."""
+    return ti.max(0.0, 1.0 - _FIRST * past, _SECOND * (_END - past))
 
 
 @ti.func

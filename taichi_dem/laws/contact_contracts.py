@@ -265,7 +265,7 @@ class FrictionLaw(Effect):
 
     @ti.func
     def follow(self, k, normal, slip):
-        """Turn the spring of entry k into the plane of contact and stretch it by ``way`` [m]."""
+        """Turn the spring of entry k into the plane of contact and stretch it by ``slip`` [m]."""
 
     @ti.func
     def slip(self, m, k, limit, moved):

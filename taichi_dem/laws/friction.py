@@ -92,7 +92,7 @@ class StickingFriction(Friction):
 
     @ti.func
     def follow(self, k, normal, slip):
-        """Turn the spring of sphere pair k into the contact's plane, stretch it by ``way`` [m]."""
+        """Turn the spring of sphere pair k into the contact's plane, stretch it by ``slip`` [m]."""
         stretch = self.stretch[k]
         flat = stretch - dot(stretch, normal) * normal
         # Turned, not projected: to turn with the contact takes no energy.

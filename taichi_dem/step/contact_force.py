@@ -31,13 +31,13 @@ class TangentialSprings:
 
     @ti.func
     def follow(self, k, rotation, normal, slip):
-        """Stretch the spring of sphere pair k by ``way`` [m]."""
+        """Stretch the spring of sphere pair k by ``slip`` [m]."""
         across = transposed_matvec(rotation, normal)
         self.friction.follow(k, across, transposed_matvec(rotation, slip))
 
     @ti.func
     def slip(self, m, k, rotation, bound, moved):
-        """Shorten the spring of sphere pair k to a bound [N] after ``way`` [m]; energy [J]."""
+        """Shorten the spring of sphere pair k to a bound [N] after ``moved`` [m]; energy [J]."""
         return self.friction.slip(m, k, bound, transposed_matvec(rotation, moved))
 
     @ti.func

@@ -164,5 +164,5 @@ class Transport(OnCells):
             cell, target = ti.cast(self.movers[s, k], ti.i32), ti.cast(self.targets[s, k], ti.i32)
             ranked = rank_in_phase(step, shared, _ALONG, cell, 0)
             if self.conflicts.holds(s, target, ranked):
-                rise = width * (target - cell)
-                self.cells.relocate(s, cell, target, self.cells.travelled[s, cell] - rise)
+                shift = width * (target - cell)
+                self.cells.relocate(s, cell, target, self.cells.travelled[s, cell] - shift)
